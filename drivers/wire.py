@@ -26,7 +26,14 @@ QUIET_AFTER_FAULT_S = 0.002
 """Silence that must pass after a timeout or a broken frame before the next request, so that a late reply
 is thrown away and not taken for the next answer."""
 
+MAX_QUIET_S = 0.05
+"""A line that never falls silent (a device that sends by itself) is spoken to all the same after so long."""
+
 READ_SIZE = 4096
+
+SILENT_CHECK_S = 0.25
+"""A port that gives nothing for so long is asked whether it is still there: a terminal that was unplugged reads as
+silent for ever."""
 
 
 class Port(Protocol):
@@ -78,9 +85,11 @@ class Exchange(Generic[T]):
     """One request and its reply.
 
     `length(buffer)` returns how many bytes the complete reply has, 0 while that cannot be said or more bytes
-    are needed, and raises `FrameError` when the buffer cannot become a reply. `parse(frame, sent_s, received_s)`
-    turns the complete frame into the value, and may raise any `DriverError`. `repeatable` says whether sending it
-    twice does no harm; only then it is retried. A request of which no reply is expected has `length=None`.
+    are needed, and raises `FrameError` when the buffer cannot become a reply. It may delete bytes at the buffer's
+    front that belong to no reply (line noise, the rest of a stream); they count as stray.
+    `parse(frame, sent_s, received_s)` turns the complete frame into the value, and may raise any `DriverError`.
+    `repeatable` says whether sending it twice does no harm; only then it is retried. A request of which no reply is
+    expected has `length=None`.
     """
 
     __slots__ = (
@@ -162,6 +171,8 @@ class Link:
         self._buffer = bytearray()
         self._deadline_s = 0.0
         self._free_at_s = 0.0
+        self._quiet_limit_s = 0.0
+        self._check_at_s = 0.0
         self._read, self._write = _raw_io(port)
 
     def wire_s(self, byte_count: int) -> float:
@@ -199,12 +210,19 @@ class Link:
 
     def service(self) -> None:
         """Take what has come, finish or retry the exchange in flight, send the next. Never blocks."""
+        if self.broken is not None:
+            return
         try:
             data = self._read(READ_SIZE)
+            now = self.clock.now()
+            if data:
+                self._check_at_s = now + SILENT_CHECK_S
+            elif now >= self._check_at_s:
+                self._check_at_s = now + SILENT_CHECK_S
+                getattr(self.port, "in_waiting", 0)
         except (OSError, serial.SerialException) as error:
             self._break(PortError(self.name, f"the port was lost ({error}); check cable and adapter"))
             return
-        now = self.clock.now()
         if data:
             self._take(data, now)
         if self._current is not None and now >= self._deadline_s:
@@ -229,8 +247,11 @@ class Link:
             return
         self._buffer += data
         assert exchange.length is not None
+        size = 0
         try:
+            held = len(self._buffer)
             size = exchange.length(self._buffer)
+            self.traffic.stray_bytes += held - len(self._buffer)
             if size == 0 or size > len(self._buffer):
                 return
             frame = bytes(self._buffer[:size])
@@ -249,8 +270,11 @@ class Link:
     def _stray(self, data: bytes, now: float) -> None:
         if self.listener is not None:
             self.listener(data, now)
-        else:
-            self.traffic.stray_bytes += len(data)
+            return
+        self.traffic.stray_bytes += len(data)
+        if now < self._quiet_limit_s:
+            # A late reply, still coming: the silence counts from its end.
+            self._free_at_s = min(now + max(self.gap_s, QUIET_AFTER_FAULT_S), self._quiet_limit_s)
 
     def _finish(self, exchange: Exchange[Any], now: float) -> None:
         exchange.received_s = now
@@ -271,6 +295,7 @@ class Link:
         self._current = None
         self._buffer.clear()
         self._free_at_s = now + max(self.gap_s, QUIET_AFTER_FAULT_S)
+        self._quiet_limit_s = now + max(self.gap_s, MAX_QUIET_S)
         if exchange.repeatable and exchange.attempts < self.attempts:
             self.traffic.retries += 1
             self._queue.appendleft(exchange)
@@ -299,6 +324,7 @@ class Link:
             self._free_at_s = now + self.wire_s(len(exchange.request)) + self.gap_s
             return
         self._current = exchange
+        self._quiet_limit_s = 0.0
         self._buffer.clear()
         self._deadline_s = now + exchange.timeout_s + self.wire_s(len(exchange.request))
 
@@ -379,7 +405,7 @@ def open_port(device: str, url: str, baudrate: int, *, parity: str = "N", stopbi
         # USB adapters hold bytes back for up to 16 ms otherwise; ports without the ioctl say so with an error.
         with contextlib.suppress(OSError, ValueError, NotImplementedError):
             port.set_low_latency_mode(True)
-    return port  # type: ignore[no-any-return]  # pyserial's factory is untyped
+    return port
 
 
 def _raw_io(port: Port) -> tuple[Callable[[int], bytes], Callable[[bytes], int | None]]:

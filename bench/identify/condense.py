@@ -1,0 +1,67 @@
+"""A shorter stand-in for long data, on which models are searched and compared before the last polish."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .motion import holds
+from .problem import Problem, Run
+
+TARGET = 5000  # samples left, about
+
+
+def condensed(problem: Problem, target: int = TARGET) -> tuple[Problem, list[NDArray[np.intp]]]:
+    """Block means that keep what the model feels: (the shorter problem, of each run the block of every sample).
+
+    In a hold the blocks grow with the time since its start, as relaxation slows down; in motion they are of equal
+    length. A block weighs as many samples as it stands for. Data that are short already come back as they are.
+    """
+    moving, blocks_of_holds = 0, 0
+    still = [holds(run.time_s, run.u) for run in problem.runs]
+    for run, stretches in zip(problem.runs, still, strict=True):
+        held = sum(s.stop - s.start for s in stretches)
+        moving += run.size - held
+        blocks_of_holds += 60 * len(stretches)
+    if problem.size <= target:
+        return problem, [np.arange(run.size) for run in problem.runs]
+    length = max(1, int(np.ceil(moving / max(target - blocks_of_holds, target // 3))))
+    growth = 0.08 if blocks_of_holds < target else 0.08 * blocks_of_holds / target
+    runs, owners = [], []
+    for run, stretches in zip(problem.runs, still, strict=True):
+        owner = _blocks(run, stretches, length, growth)
+        runs.append(_averaged(run, owner))
+        owners.append(owner)
+    short = Problem(tuple(runs), problem.depth_mm, problem.force_N)
+    return short, owners
+
+
+def _blocks(run: Run, stretches: list[slice], length: int, growth: float) -> NDArray[np.intp]:
+    starts = []
+    at = 0
+    for s in [*stretches, slice(run.size, run.size)]:
+        starts.append(np.arange(at, s.start, length))
+        n = s.stop - s.start
+        if n:
+            grid = [0.0]
+            while grid[-1] < n:
+                grid.append(grid[-1] + max(1.0, growth * grid[-1]))
+            starts.append(s.start + np.unique(np.array(grid[:-1]).astype(np.intp)))
+        at = s.stop
+    first = np.zeros(run.size, dtype=np.intp)
+    first[np.unique(np.concatenate(starts)).astype(np.intp)] = 1
+    first[0] = 0
+    # A run's first sample stays alone: the jump from rest to it is part of the motion.
+    if run.size > 1:
+        first[1] = 1
+    return np.cumsum(first)
+
+
+def _averaged(run: Run, owner: NDArray[np.intp]) -> Run:
+    count = np.bincount(owner).astype(float)
+    weight = np.bincount(owner, run.weight)
+    time = np.bincount(owner, run.time_s) / count
+    u = np.bincount(owner, run.u) / count
+    with np.errstate(invalid="ignore"):
+        y = np.where(weight > 0, np.bincount(owner, run.weight * run.y) / weight, 0.0)
+    return Run(time, np.diff(time, prepend=time[0]), u, y, weight)

@@ -1,0 +1,74 @@
+"""Where the motion holds still, and how noisy the reported position is; found in the data alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ._kernel import Array
+
+MIN_HOLD = 8  # samples
+
+
+def jitter(position: Array) -> float:
+    """Standard deviation of the position's noise, in its unit: local straight lines over six samples.
+
+    The quietest quarter of the windows counts (25 % point of a χ² of 4 degrees: 1.923), so curved motion elsewhere
+    does not. 0 where the position stands exactly still.
+    """
+    n = len(position) // 6
+    if n < 4:
+        return 0.0
+    windows = position[: 6 * n].reshape(n, 6)
+    t = np.arange(6) - 2.5
+    level = windows.mean(axis=1, keepdims=True)
+    slope = (windows @ t / (t @ t))[:, None]
+    squares = np.sum((windows - level - slope * t) ** 2, axis=1)
+    return float(np.sqrt(np.quantile(squares, 0.25) / 1.923))
+
+
+@njit(cache=True, nogil=True)
+def _stretches(position: Array, tolerance: float, least: int) -> NDArray[np.int64]:
+    n = position.shape[0]
+    found = np.empty((n // least + 1, 2), dtype=np.int64)
+    count, start = 0, 0
+    while start < n:
+        low = high = position[start]
+        stop = start + 1
+        while stop < n:
+            low, high = min(low, position[stop]), max(high, position[stop])
+            if high - low > tolerance:
+                break
+            stop += 1
+        if stop - start >= least:
+            found[count, 0], found[count, 1] = start, stop
+            count += 1
+            start = stop
+        else:
+            start += 1
+    return found[:count]
+
+
+def holds(time_s: Array, position: Array) -> list[slice]:
+    """Stretches where the position stays put: at least eight samples within its noise, and no trend.
+
+    A slow ramp also stays within a tolerance for a while; it is told by its two ends, which differ by more than
+    the noise lets their means differ.
+    """
+    noise = jitter(position)
+    reach = float(np.ptp(position))
+    tolerance = max(8 * noise, 5e-4 * reach)
+    out: list[slice] = []
+    for start, stop in _stretches(position, tolerance, MIN_HOLD):
+        third = max((stop - start) // 3, 1)
+        drift = abs(float(np.mean(position[start : start + third]) - np.mean(position[stop - third : stop])))
+        steady = 4 * noise * np.sqrt(2 / third) + 0.15 * tolerance
+        if drift > steady or time_s[stop - 1] <= time_s[start]:
+            continue
+        # Neighbours of one hold, cut where a drift or a jump of one noise width ran over the tolerance.
+        if out and out[-1].stop >= start - 1 and abs(np.median(position[out[-1]]) - np.median(position[start:stop])) < tolerance:
+            out[-1] = slice(out[-1].start, int(stop))
+        else:
+            out.append(slice(int(start), int(stop)))
+    return out

@@ -1,0 +1,132 @@
+"""How noisy the data are, found without any model of the pad."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.recording.types import Measurement
+
+from ._kernel import Array
+from .motion import holds, jitter
+
+DEPTHS = 12  # bins of depth over which the stiffness is estimated
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations. `floor_N`: of a simulated-output error with nothing left to explain, which is the force's
+    own noise and what the position's noise makes through the stiffness. `from_holds`: else from motion (no hold)."""
+
+    force_N: float
+    position_mm: float
+    floor_N: float
+    from_holds: bool
+
+
+def noise_of(measurements: list[Measurement] | tuple[Measurement, ...]) -> Noise:
+    """Noise of the force about smooth curves through the holds, and of the position through the local stiffness.
+
+    In a hold the curve is a sum of exponentials on a fixed log-spaced set of times, at most one term for eight samples,
+    so noise of any colour much quicker than the hold stays in. Without holds: local parabolas over nine samples.
+    The force's resolution counts as noise of step/√12.
+    """
+    squares, freedom = 0.0, 0.0
+    errors: list[Array] = []
+    for m in measurements:
+        for stretch in holds(m.position_time_s, m.position_mm):
+            t0, t1 = m.position_time_s[stretch.start], m.position_time_s[stretch.stop - 1]
+            inside = (m.force_time_s >= t0) & (m.force_time_s <= t1)
+            error, free = _about_curve(m.force_time_s[inside] - t0, m.force_N[inside])
+            if free > 0:
+                errors.append(error * np.sqrt(len(error) / free))
+                freedom += free
+    from_holds = freedom >= 10
+    if from_holds:
+        squares = _trimmed_square(np.concatenate(errors))
+    else:
+        squares = float(np.mean([_about_parabolas(m.force_N) ** 2 for m in measurements]))
+    resolution = min(_resolution(m.force_N) for m in measurements)
+    force = float(np.sqrt(max(squares, resolution**2 / 12)))
+    position = float(np.sqrt(np.mean([jitter(m.position_mm) ** 2 for m in measurements])))
+    through = np.concatenate([stiffness_along(m) for m in measurements]) if position > 0 else np.zeros(1)
+    floor = float(np.sqrt(force**2 + position**2 * np.mean(through**2)))
+    return Noise(force, position, floor, from_holds)
+
+
+def _about_curve(t: Array, y: Array) -> tuple[Array, float]:
+    n = len(y)
+    if n < 8:
+        return np.zeros(0), 0.0
+    terms = int(np.clip(n // 8, 1, 7))
+    span, step = t[-1] - t[0], (t[-1] - t[0]) / n
+    basis = [np.ones(n), (t - t[0]) / span]
+    basis += [np.exp(-(t - t[0]) / tau) for tau in np.geomspace(3 * step, span / 2, terms)]
+    A = np.stack(basis, axis=1)
+    solution, _, rank, _ = np.linalg.lstsq(A, y - y.mean(), rcond=1e-9)
+    return y - y.mean() - A @ solution, float(n - rank)
+
+
+def _trimmed_square(e: Array) -> float:
+    """Mean square without the few that stand far out (spikes, ringing after a ramp)."""
+    spread = 1.4826 * float(np.median(np.abs(e)))
+    kept = e[np.abs(e) <= 5 * spread] if spread > 0 else e
+    return float(np.mean(kept**2))
+
+
+def _about_parabolas(y: Array) -> float:
+    n = len(y) // 9
+    if n < 2:
+        return float(np.std(np.diff(y)) / np.sqrt(2))
+    t = np.linspace(-1, 1, 9)
+    A = np.stack([np.ones(9), t, t * t], axis=1)
+    windows = y[: 9 * n].reshape(n, 9)
+    error = windows - windows @ (A @ np.linalg.pinv(A)).T
+    # Median of a χ² of 6 degrees: 5.348.
+    return float(np.sqrt(np.median(np.sum(error**2, axis=1)) / 5.348))
+
+
+def _resolution(y: Array) -> float:
+    levels = np.unique(y)
+    if len(levels) < 2 or len(levels) > 0.5 * len(y):
+        return 0.0
+    steps = np.diff(levels)
+    return float(np.min(steps[steps > 1e-9 * np.ptp(y)], initial=np.ptp(y)))
+
+
+def stiffness_along(m: Measurement) -> Array:
+    """|dF/dδ| in N/mm at every force sample, model-free: slopes over moves, the median by depth; 0 above the surface."""
+    depth = np.interp(m.force_time_s, m.position_time_s, m.position_mm)
+    reach = float(np.ptp(depth))
+    if reach == 0:
+        return np.zeros(len(depth))
+    # From each sample to the first one a thirtieth of the whole travel away.
+    stride = _strides(depth, reach / 30)
+    i = np.flatnonzero(stride > 0)
+    if len(i) == 0:
+        return np.zeros(len(depth))
+    j = i + stride[i]
+    quick = stride[i] <= np.quantile(stride[i], 0.7)  # in slow moves relaxation hides the stiffness
+    i, j = i[quick], j[quick]
+    slope = np.abs((m.force_N[j] - m.force_N[i]) / (depth[j] - depth[i]))
+    middle = (depth[i] + depth[j]) / 2
+    edges = np.linspace(depth.min(), depth.max(), DEPTHS + 1)
+    number = np.clip(np.searchsorted(edges, middle) - 1, 0, DEPTHS - 1)
+    filled = [k for k in range(DEPTHS) if np.any(number == k)]
+    centre = [(edges[k] + edges[k + 1]) / 2 for k in filled]
+    value = [float(np.median(slope[number == k])) for k in filled]
+    return np.where(depth > 0, np.interp(depth, centre, value), 0.0)
+
+
+def _strides(depth: Array, distance: float) -> NDArray[np.intp]:
+    """How many samples on from each the depth is `distance` away; 0 where that takes more than 400 samples."""
+    out = np.zeros(len(depth), dtype=np.intp)
+    for k in (1, 2, 3, 5, 8, 13, 20, 32, 50, 80, 125, 200, 400):
+        if k >= len(depth):
+            break
+        far = np.abs(depth[k:] - depth[:-k]) >= distance
+        fresh = far & (out[:-k] == 0)
+        out[:-k][fresh] = k
+    return out

@@ -1,0 +1,101 @@
+"""The cost (16) over all runs, its gradient and Gauss-Newton matrix, in memory bounded by one chunk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _kernel
+from ._kernel import Array
+from .laws import Family
+from .problem import Problem, Run
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What is being fitted: law, order r, contact. x = [θ (k), log ν (r), a (r+1)], ν in 1/s."""
+
+    family: Family
+    order: int
+    unilateral: bool
+
+    @property
+    def size(self) -> int:
+        """Length of x."""
+        return self.family.size + 2 * self.order + 1
+
+    def split(self, x: Array) -> tuple[Array, Array, Array]:
+        """θ (k,), ν (r,), a (r+1,)."""
+        k, r = self.family.size, self.order
+        return x[:k], np.exp(x[k : k + r]), x[k + r :]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The model over one chunk; arrays (n,), `jacobian` (n, P) or (0, 0)."""
+
+    at: slice
+    force: Array
+    elastic: Array
+    jacobian: Array
+    let_go: NDArray[np.bool_]
+
+
+def simulate(run: Run, structure: Structure, x: Array, derivatives: bool = False, shift: float = 0.0) -> Iterator[Piece]:
+    """The model on a run from rest, chunk by chunk; `shift` is added to the depth u."""
+    theta, rates, weights = structure.split(x)
+    r, P = structure.order, structure.size
+    state, d_state, coupled = np.zeros(r + 1), np.zeros((r + 1, P)), np.zeros(1, dtype=np.int64)
+    for at in run.chunks():
+        n = at.stop - at.start
+        s, ds = structure.family.shape(run.u[at] + shift if shift else run.u[at], theta)
+        force, elastic, gone = np.empty(n), np.empty(n), np.empty(n, dtype=np.bool_)
+        jacobian = np.empty((n, P) if derivatives else (0, 0))
+        _kernel.advance(
+            run.dt_s[at], s, ds, rates, weights, structure.unilateral,
+            state, d_state, coupled, force, elastic, jacobian, gone,
+        )  # fmt: skip
+        yield Piece(at, force, elastic, jacobian, gone)
+
+
+def cost(problem: Problem, structure: Structure, x: Array) -> float:
+    """Σ w e², force in units of the problem's scale."""
+    total = 0.0
+    for run in problem.runs:
+        for piece in simulate(run, structure, x):
+            error = run.y[piece.at] - piece.force
+            total += float(np.dot(run.weight[piece.at] * error, error))
+    return total
+
+
+def normal_equations(problem: Problem, structure: Structure, x: Array) -> tuple[float, Array, Array]:
+    """Σ w e², Σ w e ∂F/∂x (P,), Σ w ∂F/∂x ∂F/∂xᵀ (P, P)."""
+    P = structure.size
+    total, gradient, matrix = 0.0, np.zeros(P), np.zeros((P, P))
+    for run in problem.runs:
+        for piece in simulate(run, structure, x, derivatives=True):
+            root = np.sqrt(run.weight[piece.at])
+            error = root * (run.y[piece.at] - piece.force)
+            weighted = piece.jacobian * root[:, None]
+            total += float(np.dot(error, error))
+            gradient += weighted.T @ error
+            matrix += weighted.T @ weighted
+    return total, gradient, matrix
+
+
+def forces(problem: Problem, structure: Structure, x: Array) -> list[tuple[Array, NDArray[np.bool_], Array]]:
+    """Of each run, over its union grid: simulated force, let-go, elastic response (of the free surface after let-go)."""
+    out = []
+    for run in problem.runs:
+        pieces = list(simulate(run, structure, x))
+        out.append(
+            (
+                np.concatenate([p.force for p in pieces]),
+                np.concatenate([p.let_go for p in pieces]),
+                np.concatenate([p.elastic for p in pieces]),
+            )
+        )
+    return out

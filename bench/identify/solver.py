@@ -1,0 +1,84 @@
+"""Levenberg-Marquardt within bounds, on the normal equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._kernel import Array
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where the search ended: x (P,), Σ w e² there, the Gauss-Newton matrix (P, P), steps, whether it had converged."""
+
+    x: Array
+    cost: float
+    matrix: Array
+    steps: int
+    converged: bool
+
+
+def minimise(
+    normal: Callable[[Array], tuple[float, Array, Array]],
+    cost: Callable[[Array], float],
+    x0: Array,
+    lower: Array,
+    upper: Array,
+    max_steps: int = 80,
+    tolerance: float = 1e-12,
+) -> Solution:
+    """Minimise Σ e² from x0; `normal` gives (Σ e², Jᵀe, JᵀJ) with J = ∂model/∂x, e = data − model.
+
+    Converged: the step promised and made less than `tolerance` of the cost, or there is nothing left to gain. A
+    variable at a bound that the gradient presses against is held there. Marquardt's scaling: the result does not
+    hang on the units of x.
+    """
+    x = np.clip(x0, lower, upper)
+    damping, grow = 1e-3, 2.0
+    value, g, H = normal(x)
+    floor = 1e-30 * max(value, 1.0)
+    for step in range(1, max_steps + 1):
+        free = ~(((x <= lower) & (g < 0)) | ((x >= upper) & (g > 0)))
+        scale = np.sqrt(np.maximum(np.diag(H), 1e-14 * np.max(np.diag(H)) + 1e-300))
+        # What an undamped step could still gain, whatever the damping has grown to.
+        if not free.any() or _promise(H, g, scale, free) <= max(tolerance * value, floor):
+            return Solution(x, value, H, step, True)
+        for _ in range(30):
+            move = _step(H, g, scale, free, damping)
+            tried = np.clip(x + move, lower, upper)
+            actual_move = tried - x
+            promised = float(2 * g @ actual_move - actual_move @ H @ actual_move)
+            gained = value - cost(tried)
+            if gained > 0 and np.isfinite(gained):
+                break
+            damping, grow = damping * grow, grow * 2
+            if damping > 1e12:
+                return Solution(x, value, H, step, _promise(H, g, scale, free) <= 1e-6 * value + floor)
+        else:
+            return Solution(x, value, H, step, _promise(H, g, scale, free) <= 1e-6 * value + floor)
+        x = tried
+        ratio = gained / promised if promised > 0 else 1.0
+        damping = max(damping * max(1 / 5, 1 - (2 * ratio - 1) ** 3), 1e-15)
+        grow = 2.0
+        value, g, H = normal(x)
+    return Solution(x, value, H, max_steps, False)
+
+
+def _step(H: Array, g: Array, scale: Array, free: np.ndarray, damping: float) -> Array:
+    move = np.zeros(len(g))
+    S = scale[free]
+    A = H[np.ix_(free, free)] / np.outer(S, S)
+    A[np.diag_indices_from(A)] += damping
+    move[free] = np.linalg.lstsq(A, g[free] / S, rcond=1e-15)[0] / S
+    return move
+
+
+def _promise(H: Array, g: Array, scale: Array, free: np.ndarray) -> float:
+    S = scale[free]
+    b = g[free] / S
+    A = H[np.ix_(free, free)] / np.outer(S, S)
+    A[np.diag_indices_from(A)] += 1e-12
+    return float(b @ np.linalg.lstsq(A, b, rcond=1e-15)[0])

@@ -1,0 +1,157 @@
+"""Standard errors that hold under coloured residuals, uneven noise, and a doubtful surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import objective
+from ._kernel import Array
+from .estimate import Estimate
+from .problem import Problem
+
+MOST = 400_000  # scores kept one by one; beyond, sums over short neighbourhoods
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Covariance of x (P, P), in the scaled units; `samples`: how many independent ones the residual is worth."""
+
+    covariance: Array
+    samples: float
+
+
+def spread_of(problem: Problem, estimate: Estimate) -> Spread:
+    """Sandwich H⁻¹ S H⁻¹, H = Σ J Jᵀ, in two forms; of each variable the larger variance counts.
+
+    - S from the scores J e themselves, summed over windows as long as the residual remembers (Bartlett's kernel):
+      holds where the noise grows with depth or the model does not fit, poor where few samples carry a parameter;
+    - S = Σ J_k γ(k−l) J_lᵀ with the residual's autocovariance γ over all the data: steady, but holds for even noise.
+    To it comes what the doubt of the surface found by touch-off moves x by. Variables at a bound have no spread.
+    """
+    P = estimate.structure.size
+    scores, sensitivity, errors, surface = _per_sample(problem, estimate)
+    total = sum(len(e) for e in errors)
+    gamma, lags = _autocovariance(errors)
+    memory = 1 + 2 * float(np.sum(gamma[1:] / gamma[0])) if gamma[0] > 0 else 1.0
+    free = _free(estimate)
+    inverse = np.zeros((P, P))
+    H = estimate.matrix[np.ix_(free, free)]
+    inverse[np.ix_(free, free)] = _inverted(H)
+    by_scores = inverse @ _windowed(scores, 2 * lags) @ inverse
+    by_colour = inverse @ _coloured(sensitivity, gamma) @ inverse
+    freedom = max(total / max(total - free.sum(), 1.0), 1.0)
+    widest = np.sqrt(np.maximum(np.diag(by_scores), np.diag(by_colour)) * freedom)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.where(np.diag(by_colour) > 0, widest / np.sqrt(np.diag(by_colour)), 1.0)
+    covariance = by_colour * np.outer(ratio, ratio)
+    for j, m in enumerate(problem.measurements):
+        if m.surface_std_mm > 0:
+            shift = inverse @ surface[j] * (m.surface_std_mm / problem.depth_mm)
+            covariance = covariance + np.outer(shift, shift)
+    return Spread(covariance, total / max(memory, 1.0))
+
+
+def _free(estimate: Estimate) -> np.ndarray:
+    lower, upper = estimate.bounds.of(estimate.structure)
+    x = estimate.x
+    k, r = estimate.structure.family.size, estimate.structure.order
+    free = (x > lower) & (x < upper)
+    for i in range(r):  # a mode without a share has no rate
+        free[k + i] &= bool(x[k + r + 1 + i] > 0)
+    return free
+
+
+def _inverted(H: Array) -> Array:
+    scale = np.sqrt(np.diag(H))
+    scale[scale == 0] = 1.0
+    values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
+    values = np.maximum(values, 1e-13 * max(values.max(initial=0.0), 1e-300))
+    return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
+
+
+def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
+    """Of each run, over the samples that count: scores w e J, w J, errors; and Jᵀ ∂F/∂(shift of the depth)."""
+    structure, x = estimate.structure, estimate.x
+    scores, sensitivities, errors, surface = [], [], [], []
+    step = 1e-5
+    for j, run in enumerate(problem.runs):
+        doubtful = bool(problem.measurements) and problem.measurements[j].surface_std_mm > 0
+        pieces = objective.simulate(run, structure, x, derivatives=True)
+        above = objective.simulate(run, structure, x, shift=step) if doubtful else None
+        below = objective.simulate(run, structure, x, shift=-step) if doubtful else None
+        J_parts, e_parts, moved = [], [], np.zeros(structure.size)
+        for piece in pieces:
+            counts = run.weight[piece.at] > 0
+            J = piece.jacobian[counts]
+            J_parts.append(J)
+            e_parts.append(run.y[piece.at][counts] - piece.force[counts])
+            if above is not None and below is not None:
+                slope = (next(above).force - next(below).force)[counts] / (2 * step)
+                # The data have the true depth: a fit at a wrong surface moves x by −H⁻¹ Jᵀ ∂F/∂shift.
+                moved -= J.T @ slope
+        J, e = np.concatenate(J_parts), np.concatenate(e_parts)
+        scores.append(J * e[:, None])
+        sensitivities.append(J)
+        errors.append(e)
+        surface.append(moved)
+    return scores, sensitivities, errors, surface
+
+
+def _autocovariance(errors: list[Array]) -> tuple[Array, int]:
+    """γ(0) … γ(L) of the residual, up to where it has died away (below 5 % or two standard errors), L+1."""
+    longest = max(len(e) for e in errors)
+    total = sum(len(e) for e in errors)
+    most = max(longest // 4, 1)
+    gamma = np.zeros(most)
+    for e in errors:
+        size = 1 << int(np.ceil(np.log2(2 * len(e))))
+        power = np.abs(np.fft.rfft(e, size)) ** 2
+        raw = np.fft.irfft(power, size)[: min(most, len(e))]
+        gamma[: len(raw)] += raw
+    gamma /= total
+    if gamma[0] <= 0:
+        return gamma[:1], 1
+    small = np.flatnonzero(gamma / gamma[0] < max(0.05, 2 / np.sqrt(total)))
+    last = int(small[0]) if len(small) else most
+    return gamma[: max(last, 1)], max(last, 1)
+
+
+def _windowed(scores: list[Array], width: int) -> Array:
+    """Σ_kl w(k−l) g_k g_lᵀ with Bartlett's w, by sums over all windows of `width` samples."""
+    P = scores[0].shape[1]
+    out = np.zeros((P, P))
+    for g in scores:
+        if width <= 1:
+            out += g.T @ g
+            continue
+        padded = np.concatenate([np.zeros((1, P)), np.cumsum(g, axis=0)])
+        n = len(g)
+        ends = np.minimum(np.arange(1, n + width), n)
+        begins = np.maximum(np.arange(1 - width, n), 0)
+        windows = padded[ends] - padded[begins]
+        out += windows.T @ windows / width
+    return out
+
+
+def _coloured(sensitivity: list[Array], gamma: Array) -> Array:
+    """Σ_kl γ(k−l) J_k J_lᵀ, by Fourier transform (the kernel tapered to stay non-negative)."""
+    P = sensitivity[0].shape[1]
+    out = np.zeros((P, P))
+    L = len(gamma)
+    for J in sensitivity:
+        if L == 1:
+            out += gamma[0] * (J.T @ J)
+            continue
+        n = len(J)
+        size = 1 << int(np.ceil(np.log2(n + L)))
+        kernel = np.zeros(size)
+        kernel[:L] = gamma
+        kernel[-(L - 1) :] = gamma[:0:-1]
+        spectrum = np.maximum(np.fft.rfft(kernel).real, 0.0)
+        fold = np.full(len(spectrum), 2.0)
+        fold[0] = fold[-1] = 1.0
+        transformed = np.fft.rfft(J, size, axis=0)
+        out += np.real((transformed.conj() * (fold * spectrum)[:, None]).T @ transformed) / size
+    return out

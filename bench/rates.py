@@ -1,0 +1,71 @@
+"""How fast the devices of a bench file can be expected to answer, before any of them has been opened.
+
+For plans and preflight; a run uses what the opened drivers say. An Orca stream exchange is 9 + 19 bytes of 11 bits
+(devices.md 6), a DAD 141.1 `SW` line 21 bytes of 10 bits and at most 600 a second (3.1); a device with a register
+map is read block by block, each a request of 8 bytes and a reply of 5 and two a register, behind its reply delay.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from bench.config import Bench
+from drivers.regmap import load_map
+
+STREAM_HZ = 1000.0
+"""What a streamed motor is asked for unless the bench file or the protocol says otherwise."""
+
+_ORCA_BITS, _ORCA_BAUD = 28 * 11, 19200
+_LINE_BITS, _LINE_BAUD, _LINE_HZ = 21 * 10, 115200, 600.0
+
+
+def streams(bench: Bench) -> bool:
+    """Whether the motor takes a position every tick, rather than making whole moves by itself."""
+    return bench.motor.driver == "orca"
+
+
+def motor_rate_Hz(bench: Bench, asked_Hz: float | None = None) -> float:
+    """Samples a second to expect of the motor; `asked_Hz` is the protocol's wish, the wire's limit stands above it."""
+    spec = bench.motor
+    if streams(bench):
+        most = 1.0 / (_ORCA_BITS / (spec.baudrate or _ORCA_BAUD) + (spec.gap_us or 0) * 1e-6)
+        return min(asked_Hz or spec.rate or STREAM_HZ, most)
+    usual, exchange_s = _polled(bench, "motor")
+    return min(asked_Hz or spec.rate or usual, 1.0 / exchange_s)
+
+
+def force_rate_Hz(bench: Bench, asked_Hz: float | None = None) -> float:
+    """Force samples a second to expect of the load cell."""
+    spec = bench.load_cell
+    if spec.driver == "dad141":
+        most = min(_LINE_HZ, (spec.baudrate or _LINE_BAUD) / _LINE_BITS)
+        return min(asked_Hz or spec.rate or most, most)
+    usual, exchange_s = _polled(bench, "load_cell")
+    return min(asked_Hz or spec.rate or usual, 1.0 / exchange_s)
+
+
+def force_latency_s(bench: Bench, asked_Hz: float | None = None) -> float:
+    """From the pad reaching a force to the motor told to stop, at the longest.
+
+    One sample period, one reply on the wire, the bench's measured `timing.force_delay`, and the motor's next turn:
+    a streamed one takes the stop with the next frame; one that is polled ends the exchange under way first.
+    """
+    spec = bench.load_cell
+    reply_s = _LINE_BITS / (spec.baudrate or _LINE_BAUD) if spec.driver == "dad141" else _polled(bench, "load_cell")[1]
+    turns = 1.0 if streams(bench) else 2.0
+    sample_s = 1.0 / force_rate_Hz(bench, asked_Hz) + reply_s
+    return sample_s + max(0.0, bench.timing.force_delay) + turns / motor_rate_Hz(bench)
+
+
+def _polled(bench: Bench, device: Literal["motor", "load_cell"]) -> tuple[float, float]:
+    """Usual rate (Hz) of a device with a register map, and how long one reading of it takes (s)."""
+    spec = bench.motor if device == "motor" else bench.load_cell
+    form = load_map(spec.driver, spec.map, device)
+    delay_s = 1e-3 * (form.reply.processing_ms + form.reply.delay_ms) + (spec.gap_us or 0) * 1e-6
+    wanted = ("position", "fault") if device == "motor" else ("gross",)
+    blocks = {form.block_of(form.values[name]) for name in wanted if name in form.values} - {None}
+    total_s = 0.0
+    for name in blocks:
+        bits = 10 * (13 + 2 * form.blocks[name].count) if form.link.transport == "rtu" else 0
+        total_s += bits / (spec.baudrate or form.link.baudrate) + delay_s
+    return float(form.poll_rate), total_s

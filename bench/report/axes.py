@@ -1,0 +1,194 @@
+"""What the plots share: panels at fixed margins, thinned lines, phase shading, event marks, bands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from bench.recording.types import Event, Recording, StepMark
+from bench.report.decimate import thin
+from bench.report.style import light
+
+Array = NDArray[np.float64]
+
+WIDE = 940.0
+"""Width of a plot that takes the whole page, in points."""
+HALF = 470.0
+_LEFT, _RIGHT = 58.0, 14.0
+
+PHASES = ("tare", "approach", "precondition", "steps", "finish")
+"""Phases of a run; each is also the name of its colour."""
+
+
+def panels(figure: Figure, heights: Sequence[float], *, top: float = 30.0, share: bool = True) -> list[Axes]:
+    """Panels one above the other, `heights` in points, with a common x axis labelled at the lowest.
+
+    The figure's height must be `stacked(heights, top)`. All margins are fixed, so that the panels of every page
+    line up.
+    """
+    width = figure.get_figwidth() * figure.dpi
+    total = figure.get_figheight() * figure.dpi
+    made: list[Axes] = []
+    y = total - top
+    for height in heights:
+        y -= height
+        box = (_LEFT / width, y / total, (width - _LEFT - _RIGHT) / width, height / total)
+        made.append(figure.add_axes(box, sharex=made[0] if made and share else None))
+        y -= 14.0 if share else 46.0
+    if share:
+        for ax in made[:-1]:
+            ax.tick_params(labelbottom=False)
+    for ax in made:
+        ax.yaxis.set_label_coords(-44.0 / (width - _LEFT - _RIGHT), 0.5)
+    return made
+
+
+def stacked(heights: Sequence[float], top: float = 30.0) -> float:
+    """Height of the figure that holds `panels(heights)`, in points."""
+    return top + sum(heights) + 14.0 * (len(heights) - 1) + 42.0
+
+
+def line(
+    ax: Axes,
+    time_s: Array,
+    value: Array,
+    colour: str,
+    label: str = "",
+    *,
+    style: str = "-",
+    width: float = 1.2,
+) -> None:
+    """A line over time, thinned to the axes' pixels with its extremes kept. Empty arrays draw nothing."""
+    if time_s.size == 0 or not np.isfinite(value).any():
+        return
+    x, y = thin(time_s, value, max(int(ax.bbox.width), 50))
+    ax.plot(x, y, style, color=light(colour), lw=width, label=label or "_nolegend_")
+
+
+def legend(ax: Axes, *, above: bool = True) -> None:
+    """A legend in one line above the axes, where it never covers data (or inside, where it fits best)."""
+    handles, _ = ax.get_legend_handles_labels()
+    if not handles:
+        return
+    if above:
+        ax.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.01), ncols=len(handles), columnspacing=1.4, handlelength=1.8
+        )
+    else:
+        ax.legend(loc="best", handlelength=1.8)
+
+
+@dataclass(frozen=True)
+class Span:
+    """A stretch of time with a name and the phase it belongs to."""
+
+    from_s: float
+    to_s: float
+    phase: str
+    name: str
+
+
+def step_spans(marks: Sequence[StepMark], end_s: float) -> list[Span]:
+    """The stretch of each step mark: up to the next one, the last up to `end_s`."""
+    ordered = sorted(marks, key=lambda mark: mark.time_s)
+    ends = [mark.time_s for mark in ordered[1:]] + [end_s]
+    return [
+        Span(mark.time_s, max(end, mark.time_s), mark.phase, mark.name)
+        for mark, end in zip(ordered, ends, strict=True)
+    ]
+
+
+def phase_spans(spans: Sequence[Span]) -> list[Span]:
+    """Neighbouring stretches of one phase as one."""
+    joined: list[Span] = []
+    for span in spans:
+        if joined and joined[-1].phase == span.phase:
+            joined[-1] = Span(joined[-1].from_s, span.to_s, span.phase, span.phase)
+        else:
+            joined.append(Span(span.from_s, span.to_s, span.phase, span.phase))
+    return joined
+
+
+def shade(axes: Sequence[Axes], spans: Sequence[Span], *, named: bool = True) -> None:
+    """Tint the phases and, within the steps, every other step; write the phases' names where there is room."""
+    if not spans:
+        return
+    phases = phase_spans(spans)
+    steps = [span for span in spans if span.phase == "steps"]
+    for ax in axes:
+        for phase in phases:
+            if phase.phase != "steps":
+                colour = light(phase.phase if phase.phase in PHASES else "steps")
+                ax.axvspan(phase.from_s, phase.to_s, color=colour, alpha=0.16, lw=0, zorder=0)
+        if len(steps) <= 120:
+            for i, span in enumerate(steps):
+                if i % 2 == 0:
+                    ax.axvspan(span.from_s, span.to_s, color=light("steps"), alpha=0.3, lw=0, zorder=0)
+    if named:
+        _name_phases(axes[0], phases)
+
+
+def _name_phases(ax: Axes, phases: Sequence[Span]) -> None:
+    low, high = ax.get_xlim()
+    room = ax.get_position().width * WIDE
+    for phase in phases:
+        share = (min(phase.to_s, high) - max(phase.from_s, low)) / max(high - low, 1e-12)
+        if share * room > 6.2 * len(phase.name) + 6:
+            ax.annotate(
+                phase.name,
+                ((phase.from_s + phase.to_s) / 2, 0.985),
+                xycoords=("data", "axes fraction"),
+                ha="center",
+                va="top",
+                fontsize=9.5,
+                color=light("muted"),
+            )
+
+
+NOT_MARKED = frozenset({"log", "note", "retry", "timeout", "crc", "overrun", "flush", "motor_error", "load_cell_error"})
+"""Events that may come by the hundred: counted in a table, not drawn."""
+
+
+def marked_events(events: Sequence[Event], most: int = 40) -> list[tuple[int, Event]]:
+    """The events to mark in a plot, numbered from 1 as in the table under it."""
+    kept = [event for event in sorted(events, key=lambda e: e.time_s) if event.name not in NOT_MARKED]
+    return list(enumerate(kept[:most], start=1))
+
+
+def mark(axes: Sequence[Axes], events: Sequence[tuple[int, Event]]) -> None:
+    """A thin line at each event through all panels, numbered at the foot of the first; numbers never overlap."""
+    low, high = axes[0].get_xlim()
+    gap = 15.0 * (high - low) / (WIDE * axes[0].get_position().width)
+    last = -math.inf
+    level = 0
+    for number, event in events:
+        for ax in axes:
+            ax.axvline(event.time_s, color=light("event"), lw=0.9, ls=(0, (2, 2)), zorder=1)
+        level = level + 1 if event.time_s - last < gap else 0
+        last = event.time_s
+        axes[0].annotate(
+            str(number),
+            (event.time_s, 0.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(2, 3 + 12 * (level % 6)),
+            textcoords="offset points",
+            fontsize=9.5,
+            color=light("event"),
+        )
+
+
+def time_span(recording: Recording) -> tuple[float, float]:
+    """First and last moment of the recording, s: samples, marks and events; (0, 1) when it is empty."""
+    times = [channel.time_s for channel in (recording.motor, recording.load_cell) if channel.time_s.size]
+    ends = [float(t[0]) for t in times] + [float(t[-1]) for t in times]
+    ends += [mark.time_s for mark in recording.steps] + [event.time_s for event in recording.events]
+    if not ends:
+        return 0.0, 1.0
+    low, high = min(ends), max(ends)
+    return low, high if high > low else low + 1.0

@@ -1,0 +1,152 @@
+"""Several runs side by side: parameters with intervals, and the curves laid over one another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.special import chdtrc
+
+from bench.report import axes as parts
+from bench.report import curves, markup, numbers, verdict
+from bench.report.markup import digits, figure, forces, measured, section
+from bench.report.style import light
+from bench.report.svg import render
+from bench.report.view import Curve, FitView
+
+Runs = Sequence[tuple[str, FitView]]
+
+ALIKE = 0.01
+"""Parameters differ where equal ones would scatter so far in less than this share of cases."""
+
+
+def write_comparison(path: Path, runs: Runs, *, title: str = "Comparison of runs") -> None:
+    """Write a page that compares fits; `runs` holds (name, fit), in the order to show.
+
+    Raises ValueError when there is no run, OSError where the file cannot be written.
+    """
+    if not runs:
+        raise ValueError("there is no run to compare")
+    path.write_text(comparison_page(runs, title), encoding="utf-8")
+
+
+def comparison_page(runs: Runs, title: str = "Comparison of runs") -> str:
+    """The comparison as HTML text."""
+    names = _names(runs)
+    body = f'<h1>{markup.text(title)}</h1>\n<p class="sub">{markup.text(" · ".join(_short_list(names)))}</p>\n'
+    body += section("Verdicts", _verdicts(runs))
+    body += section("Curves", _curves(runs))
+    body += section("Parameters", _table(runs) + _intervals(runs))
+    return markup.page(title, body + "<footer>Written by padbench. Intervals are 95 %.</footer>")
+
+
+def _short_list(names: list[str]) -> list[str]:
+    return names if len(names) <= 6 else [*names[:5], f"{len(names) - 5} more"]
+
+
+def _verdicts(runs: Runs) -> str:
+    rows = []
+    for name, fit in runs:
+        rmse, floor = forces(fit.number("rmse"), fit.number("noise_floor"))
+        percent = fit.number("fit_percent")
+        said = verdict.fit_verdict(fit, "").headline
+        rows.append([name, verdict.structure(fit), f"{percent:.2f} %" if math.isfinite(percent) else "–", rmse, floor, said])
+    head = ["run", "model", "fit", "error, rms", "noise floor, rms", "verdict"]
+    return markup.table(head, rows, numeric=(2, 3, 4))
+
+
+def _curves(runs: Runs) -> str:
+    elastic: list[tuple[str, Curve]] = [(name, fit.elastic) for name, fit in runs if fit.elastic is not None]
+    relaxing: list[tuple[str, Curve]] = [(name, fit.relaxation) for name, fit in runs if fit.relaxation is not None]
+    pair = ""
+    if elastic:
+        pair += figure(curves.elastic(elastic), "Force before any relaxation, with 95 % bands.", wide=False)
+    if relaxing:
+        pair += figure(curves.relaxation(relaxing), "Share of the force left so long after a step.", wide=False)
+    return f'<div class="pair">{pair}</div>\n' if pair else ""
+
+
+def _parameters(runs: Runs) -> dict[str, list[tuple[int, float, float, str, bool]]]:
+    """By parameter: (run, value, std, unit, undetermined) of each run that has it, runs counted from 0."""
+    found: dict[str, list[tuple[int, float, float, str, bool]]] = {}
+    for i, (_, fit) in enumerate(runs):
+        given = fit.json.get("parameters")
+        loose = {str(name) for name in fit.json.get("undetermined") or ()}
+        for name, entry in given.items() if isinstance(given, Mapping) else ():
+            value, std, unit = numbers.of(entry)
+            if math.isfinite(value):
+                found.setdefault(str(name), []).append((i, value, std, unit, str(name) in loose))
+    return found
+
+
+def _table(runs: Runs) -> str:
+    rows = []
+    for name, entries in _parameters(runs).items():
+        cells = ["–"] * len(runs)
+        for i, value, std, _, loose in entries:
+            shown, doubt = measured(value, std)
+            cells[i] = shown + (f" ± {doubt}" if doubt not in ("–", "0") else "") + (" (undetermined)" if loose else "")
+        rows.append([numbers.symbol(name), entries[0][3], *cells, agreement(entries)])
+    head = ["parameter", "unit", *_names(runs), "do they agree?"]
+    return markup.table(head, rows, numeric=tuple(range(2, 2 + len(runs))))
+
+
+def _names(runs: Runs) -> list[str]:
+    return [name for name, _ in runs]
+
+
+def agreement(entries: Sequence[tuple[int, float, float, str, bool]]) -> str:
+    """Whether values with these standard deviations may be one and the same: χ² of their weighted scatter.
+
+    Entries are (run, value, std, unit, undetermined); undetermined ones and those of unknown doubt do not vote.
+    """
+    voting = [(value, std) for _, value, std, _, loose in entries if math.isfinite(std) and std > 0 and not loose]
+    if len(voting) < 2:
+        return ""
+    value, std = np.array(voting).T
+    weight = 1.0 / std**2
+    mean = float(weight @ value / weight.sum())
+    chi2 = float(weight @ (value - mean) ** 2)
+    chance = float(chdtrc(len(voting) - 1, chi2))
+    if chance >= ALIKE:
+        return "yes, within their uncertainty"
+    spread = f", spread {digits(100 * float(np.ptp(value)) / abs(mean), 2)} %" if mean else ""
+    return f"no{spread}, χ² {digits(chi2, 3)} of {len(voting) - 1}"
+
+
+def _intervals(runs: Runs) -> str:
+    plots = ""
+    for k, (name, entries) in enumerate(_parameters(runs).items()):
+        if len(entries) >= 2:
+            plots += f"<figure>{_interval_plot(f'interval{k}', name, entries, runs)}</figure>"
+    return f'<div class="pair">{plots}</div>\n' if plots else ""
+
+
+def _interval_plot(key: str, name: str, entries: list[tuple[int, float, float, str, bool]], runs: Runs) -> str:
+    height = 24.0 * len(entries) + 14.0
+
+    def draw(figure_: Figure) -> None:
+        [ax] = parts.panels(figure_, [height], top=10.0)
+        box = ax.get_position()
+        left = 0.30
+        ax.set_position((left, box.y0, box.x1 - left, box.height))
+        for row, (i, value, std, _, loose) in enumerate(entries):
+            colour = light("muted") if loose else light(f"run-{i % 7}")
+            reach = 1.96 * std if math.isfinite(std) else 0.0
+            ax.plot([value - reach, value + reach], [row, row], "-", color=colour, lw=2.2)
+            ax.plot([value], [row], "o", color=colour, ms=6, mfc=light("paper") if loose else colour)
+        ax.set_yticks(range(len(entries)), [_fitting(runs[i][0]) for i, *_ in entries])
+        ax.set_ylim(len(entries) - 0.5, -0.5)
+        ax.margins(x=0.08)
+        unit = entries[0][3]
+        ax.set_xlabel(f"{numbers.symbol(name)}, {unit}" if unit not in ("", "1") else numbers.symbol(name))
+
+    label = f"Parameter {name} of each run with its 95 % interval"
+    return render(key, label, parts.HALF, parts.stacked([height], 10.0), draw)
+
+
+def _fitting(name: str, most: int = 18) -> str:
+    return name if len(name) <= most else name[: most - 1] + "…"

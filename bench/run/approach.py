@@ -1,0 +1,182 @@
+"""From air to the pad's surface: tare, contact check, touch-off."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bench.errors import Stopped
+from bench.protocol import Approach
+from bench.run.loop import Loop, Script, Window
+from bench.run.motion import Mover
+from bench.run.touchoff import MIN_SAMPLES_IN_CONTACT, Air, Surface, air_of, find_surface, threshold_N
+
+TARE_S = 1.0
+"""How long the zero is averaged: 550 samples of 10 mN noise give it to 0.4 mN."""
+
+CHECK_S = 0.2
+"""How long the force is averaged before and after backing off."""
+
+SLOWER = 8.0
+"""The second approach is so many times slower than the first, for as many more samples at the surface."""
+
+BEFORE_MM = 0.1
+"""The second approach starts so far above where the first felt the pad."""
+
+BEYOND_MM = 0.3
+"""The second approach gives up so far below where the first felt the pad."""
+
+RECOVER_S = 0.5
+"""Rest between the two approaches, so that the first touch relaxes."""
+
+
+def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float) -> Script[Air]:
+    """Average the force in free air and make it the zero; refuse where the probe already touches something.
+
+    With a pad, the axis first backs off by `approach.retract` (as far as travel allows): if the force falls by more
+    than the touch threshold, there was contact. Raises `Stopped` with what was found.
+    """
+    before = yield from _average(loop, CHECK_S)
+    backed_mm = 0.0
+    if approach is not None:
+        start = mover.here()
+        lowest = loop.monitor.envelope.position_mm[0]
+        target = max(lowest, start - approach.retract)
+        backed_mm = start - target
+        yield from mover.go(target, slow_mm_s)
+        yield from loop.sleep(CHECK_S)
+    window = mover.watch()
+    yield from loop.sleep(TARE_S)
+    mover.unwatch()
+    if len(window.gross_N) < 8:
+        raise Stopped(
+            f"only {len(window.gross_N)} force samples came in {TARE_S:g} s of tare; at least 8 are needed: "
+            "raise the load cell's rate"
+        )
+    air = air_of(np.array(window.force_time_s), np.array(window.gross_N))
+    fall = before - air.mean_N
+    touch = threshold_N(approach.force if approach is not None else 0.0, air)
+    if approach is not None and backed_mm > 0 and fall > touch:
+        raise Stopped(
+            f"the probe already touches something: the force fell by {fall:.3f} N when it backed off "
+            f"{backed_mm:.2f} mm (threshold {touch:.3f} N); retract the probe (or lower the pad) and start again"
+        )
+    if abs(air.drift_N_s) * TARE_S > max(touch, 5.0 * air.sigma_N):
+        raise Stopped(
+            f"the force is not steady in air ({air.drift_N_s:+.3f} N/s): the probe touches something, "
+            "or the load cell is still warming up; no zero can be taken"
+        )
+    loop.tare_N = air.mean_N
+    loop.sink.event(
+        loop.clock.now(),
+        "tare",
+        {
+            "tare_N": air.mean_N,
+            "sigma_N": air.sigma_N,
+            "drift_N_s": air.drift_N_s,
+            "samples": air.samples,
+            "contact_check": "passed" if backed_mm > 0 else "not possible: no travel to back off",
+            "backed_off_mm": backed_mm,
+        },
+    )
+    return air
+
+
+def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_sigma_mm: float) -> Script[Surface]:
+    """Find the surface: a first approach feels it, a second, slower one measures it.
+
+    Raises `Stopped` where there is contact at once, or none within the travel allowed.
+    """
+    limit = threshold_N(approach.force, air)
+    start = mover.here()
+    deepest = loop.monitor.envelope.deepest_mm
+    found = yield from mover.go_until(deepest, approach.speed, _above(loop, limit))
+    if not found:
+        raise Stopped(
+            f"no contact: the probe went from {start:.2f} to {deepest:.2f} mm and felt less than {limit:.3f} N; "
+            "is the pad in place, and limits.position deep enough?"
+        )
+    felt = mover.here()
+    if felt - start < min(0.05, 0.5 * approach.retract):
+        raise Stopped(
+            f"contact after only {felt - start:.3f} mm of approach: the probe stood on the pad when it was tared; "
+            "retract the probe (or lower the pad) and start again"
+        )
+    loop.sink.event(loop.clock.now(), "contact", {"position_mm": felt, "net_N": loop.last_net_N, "threshold_N": limit})
+    # The first touch was made at speed, so that the pad begins up to a stopping distance above `felt`.
+    above = max(start, felt - max(BEFORE_MM, approach.speed * 0.05))
+    yield from mover.go(above, approach.speed)
+    yield from loop.sleep(RECOVER_S)
+    window = mover.watch()
+    stop_at = max(2.0 * limit, limit + 5.0 * air.sigma_N)
+    yield from mover.go_until(min(felt + BEYOND_MM, deepest), approach.speed / SLOWER, _above(loop, stop_at))
+    yield from loop.sleep(0.02)
+    mover.unwatch()
+    surface = _surface_of(window, air, position_sigma_mm)
+    if surface is None:
+        raise Stopped(
+            f"the surface could not be measured: fewer than {MIN_SAMPLES_IN_CONTACT} samples of the slow approach "
+            f"({approach.speed / SLOWER:g} mm/s) were in contact; approach slower"
+        )
+    loop.sink.event(
+        loop.clock.now(),
+        "touch_off",
+        {
+            "surface_mm": surface.position_mm,
+            "surface_std_mm": surface.std_mm,
+            "threshold_N": limit,
+            "sigma_N": air.sigma_N,
+            "exponent": surface.exponent,
+            "stiffness_N_mm": surface.stiffness_N_mm,
+        },
+    )
+    return surface
+
+
+def _above(loop: Loop, limit_N: float) -> _TwoInARow:
+    return _TwoInARow(loop, limit_N)
+
+
+class _TwoInARow:
+    """Two samples in a row at or above a force: one alone may be an outlier."""
+
+    def __init__(self, loop: Loop, limit_N: float) -> None:
+        self.loop = loop
+        self.limit_N = limit_N
+        self.before = False
+
+    def __call__(self) -> bool:
+        """Asked once for every force sample."""
+        now = self.loop.last_net_N >= self.limit_N
+        both = now and self.before
+        self.before = now
+        return both
+
+
+def _average(loop: Loop, seconds: float) -> Script[float]:
+    """Mean gross force over so many seconds."""
+    count, total = 0, 0.0
+    seen = loop.force_count
+    until = loop.clock.now() + seconds
+    while loop.clock.now() < until or count == 0:
+        if loop.force_count != seen and loop.last_force is not None:
+            seen = loop.force_count
+            count += 1
+            total += loop.last_force.gross_N
+        yield
+    return total / count
+
+
+def _surface_of(window: Window, air: Air, position_sigma_mm: float) -> Surface | None:
+    """The surface from the samples of the slow approach; positions are interpolated at the force samples."""
+    t = np.array(window.force_time_s)
+    motor_t = np.array(window.motor_time_s)
+    if motor_t.size < 2:
+        return None
+    inside = (t >= motor_t[0]) & (t <= motor_t[-1])
+    x = np.interp(t[inside], motor_t, np.array(window.position_mm))
+    force = np.array(window.net_N)[inside]
+    if x.size < 8:
+        return None
+    # What follows the deepest point is the braked stand: the pad relaxes there, and no longer tells its surface.
+    end = int(np.argmax(x)) + 1
+    return find_surface(x[:end], force[:end], air.sigma_N, position_sigma_mm)

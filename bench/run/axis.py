@@ -1,0 +1,246 @@
+"""The axis as the run sees it: one profile at a time, whichever way the motor wants to be told.
+
+A "stream" motor gets a position every tick; a "move" motor gets the end of the profile once and is polled, and the
+planned profile stands in for its own between polls. Both answer the same questions: what is commanded now, is the
+profile over, and which samples have come.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from drivers.errors import DriverError
+from drivers.motor import Motor, MotorSample
+from drivers.wire import Exchange, Pause, Steps
+
+
+class Curve(Protocol):
+    """A planned motion: positions in mm, motor frame, `t` in seconds from its start."""
+
+    duration_s: float
+    end_mm: float
+
+    def position(self, t: float, /) -> float:
+        """Planned position; the end position after the end."""
+        ...
+
+    def velocity(self, t: float, /) -> float:
+        """Planned velocity; 0 after the end."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """Standing still at `end_mm`."""
+
+    end_mm: float
+    duration_s: float = 0.0
+
+    def position(self, t: float, /) -> float:
+        """The one position."""
+        return self.end_mm
+
+    def velocity(self, t: float, /) -> float:
+        """Zero."""
+        return 0.0
+
+
+class Braking:
+    """From a position and a velocity to rest at a constant deceleration (mm, mm/s, mm/s²)."""
+
+    def __init__(self, start_mm: float, velocity_mm_s: float, deceleration_mm_s2: float) -> None:
+        self.start_mm = start_mm
+        self.velocity_mm_s = velocity_mm_s
+        self.deceleration_mm_s2 = deceleration_mm_s2
+        self.duration_s = abs(velocity_mm_s) / deceleration_mm_s2
+        self.end_mm = self.position(self.duration_s)
+
+    def position(self, t: float, /) -> float:
+        """Position `t` seconds after braking began."""
+        t = min(max(t, 0.0), self.duration_s)
+        return (
+            self.start_mm
+            + self.velocity_mm_s * t
+            - math.copysign(0.5 * self.deceleration_mm_s2 * t * t, self.velocity_mm_s)
+        )
+
+    def velocity(self, t: float, /) -> float:
+        """Velocity `t` seconds after braking began."""
+        if t >= self.duration_s:
+            return 0.0
+        return self.velocity_mm_s - math.copysign(self.deceleration_mm_s2 * t, self.velocity_mm_s)
+
+
+class Shifted:
+    """A curve planned in the pad frame, moved into the motor frame."""
+
+    def __init__(self, curve: Curve, offset_mm: float) -> None:
+        self.curve = curve
+        self.offset_mm = offset_mm
+        self.duration_s = curve.duration_s
+        self.end_mm = curve.end_mm + offset_mm
+
+    def position(self, t: float, /) -> float:
+        """Position in the motor frame."""
+        return self.curve.position(t) + self.offset_mm
+
+    def velocity(self, t: float, /) -> float:
+        """Velocity, the same in both frames."""
+        return self.curve.velocity(t)
+
+
+class Axis:
+    """Feeds one motor and collects its samples; nothing here blocks.
+
+    `period_s` is the time between commands (stream) or polls (move).
+    """
+
+    def __init__(self, motor: Motor, period_s: float) -> None:
+        self.motor = motor
+        self.period_s = period_s
+        self.clock = motor.link.clock
+        self.live = False
+        self.overruns = 0
+        self._curve: Curve = Rest(0.0)
+        self._start_s = 0.0
+        self._next_s = 0.0
+        self._waiting: deque[tuple[Exchange[MotorSample], float]] = deque()
+        self._steps: Steps[Any] | None = None
+        self._item: Exchange[Any] | Pause | None = None
+        self._pause_until_s = 0.0
+        self.failures: list[DriverError] = []
+
+    # -- what is commanded -------------------------------------------------------------------------------------
+
+    def command(self, now_s: float) -> float:
+        """The position commanded at a time, mm, motor frame."""
+        return self._curve.position(now_s - self._start_s)
+
+    def velocity(self, now_s: float) -> float:
+        """The velocity commanded at a time, mm/s."""
+        return self._curve.velocity(now_s - self._start_s)
+
+    def ended(self, now_s: float) -> bool:
+        """Whether the planned profile is over, and a move motor has taken it."""
+        return self._steps is None and now_s - self._start_s >= self._curve.duration_s
+
+    def go_live(self, position_mm: float) -> None:
+        """Begin to feed (or poll) the motor, holding a position."""
+        now = self.clock.now()
+        self._curve = Rest(position_mm)
+        self._start_s = now
+        self._next_s = now
+        self.live = True
+
+    def follow(self, curve: Curve, speed_mm_s: float, acceleration_mm_s2: float) -> None:
+        """Start a profile now; a move motor is told its end, speed (mm/s) and acceleration (mm/s²)."""
+        self._curve = curve
+        self._start_s = self.clock.now()
+        if self.motor.kind == "move":
+            self._begin(self.motor.move(curve.end_mm, speed_mm_s, acceleration_mm_s2))
+
+    def halt(self, deceleration_mm_s2: float) -> None:
+        """Decelerate from the present commanded motion and stand."""
+        now = self.clock.now()
+        velocity = self.velocity(now)
+        self._curve = Braking(self.command(now), velocity, deceleration_mm_s2) if velocity else Rest(self.command(now))
+        self._start_s = now
+        if self.motor.kind == "move":
+            self.motor.link.drop_queue()
+            self._begin(self.motor.stop())
+        else:
+            self._next_s = now
+
+    def freeze(self, position_mm: float) -> None:
+        """Take a position as commanded from now on (after a move motor was stopped where nobody planned it)."""
+        self._curve = Rest(position_mm)
+        self._start_s = self.clock.now()
+
+    def go_silent(self) -> None:
+        """Feed and poll no more."""
+        self.live = False
+        self._steps = None
+        self._waiting.clear()
+
+    # -- the bytes ---------------------------------------------------------------------------------------------
+
+    def tick(self, now_s: float) -> None:
+        """Submit what is due: the next command or poll, and the next exchange of a running move."""
+        if self._steps is not None:
+            self._advance(now_s)
+        if not self.live or now_s < self._next_s:
+            return
+        if len(self._waiting) > 1:
+            # The last command is still unanswered a whole period later: skip this one, and say so.
+            self.overruns += 1
+            self._next_s = now_s + self.period_s
+            return
+        if self.motor.kind == "stream":
+            target = self.command(now_s)
+            self._waiting.append((self.motor.link.submit(self.motor.stream(target)), target))
+        else:
+            self._waiting.append((self.motor.link.submit(self.motor.read()), math.nan))
+        late = now_s - self._next_s
+        if late > self.period_s:
+            self.overruns += 1
+            self._next_s = now_s + self.period_s
+        else:
+            self._next_s += self.period_s
+
+    def collect(self) -> list[tuple[MotorSample, float]]:
+        """Samples that have come, each with the position commanded when it was measured; errors go to `failures`."""
+        found = []
+        waiting = self._waiting
+        while waiting and waiting[0][0].done:
+            exchange, target = waiting.popleft()
+            if exchange.error is not None:
+                self.failures.append(exchange.error)
+                continue
+            sample = exchange.result()
+            found.append((sample, self.command(sample.time_s) if math.isnan(target) else target))
+        return found
+
+    def wake_at(self) -> float:
+        """When `tick` has something to do (bench clock)."""
+        due = self._next_s if self.live else math.inf
+        if self._steps is not None and isinstance(self._item, Pause):
+            due = min(due, self._pause_until_s)
+        return due
+
+    def _begin(self, steps: Steps[Any]) -> None:
+        self._steps = steps
+        self._item = None
+        self._advance(self.clock.now())
+
+    def _advance(self, now_s: float) -> None:
+        """Drive the running conversation (a move, a stop) one exchange further, if it is ready."""
+        assert self._steps is not None
+        item = self._item
+        reply: Any = None
+        error: DriverError | None = None
+        if isinstance(item, Pause):
+            if now_s < self._pause_until_s:
+                return
+        elif item is not None:
+            if not item.done:
+                return
+            reply, error = item.value, item.error
+        try:
+            item = self._steps.throw(error) if error is not None else self._steps.send(reply)
+        except StopIteration:
+            self._steps = None
+            self._item = None
+            return
+        except DriverError as failure:
+            self._steps = None
+            self._item = None
+            self.failures.append(failure)
+            return
+        self._item = item
+        if isinstance(item, Pause):
+            self._pause_until_s = now_s + item.seconds
+        else:
+            self.motor.link.submit(item, urgent=True)

@@ -1,0 +1,85 @@
+"""Steps by force: press until a force is reached, then hold the position, or hold the force (creep)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bench.errors import Stopped
+from bench.run.loop import Loop, Script, Window
+from bench.run.motion import Mover
+
+HOLD_FORCE_GAIN = 0.3
+"""Share of the force error that one correction takes away; the rest waits for the next, as the pad still relaxes."""
+
+HOLD_FORCE_SAMPLES = 8
+"""Force samples averaged for one correction."""
+
+MIN_CORRECTION_MM = 1e-3
+"""Smaller corrections are lost in the encoder's resolution."""
+
+
+def press(loop: Loop, mover: Mover, target_N: float, name: str, speed_mm_s: float, away_mm: float) -> Script[float]:
+    """Move until the net force is `target_N`; returns the local stiffness there, N/mm.
+
+    Presses deeper when the force is below the target, else backs off towards `away_mm` (motor frame).
+    Raises `Stopped` where the travel ends before the force comes.
+    """
+    deeper = loop.last_net_N < target_N
+    end = loop.monitor.envelope.deepest_mm if deeper else away_mm
+    window = mover.watch()
+
+    def reached() -> bool:
+        return loop.last_net_N >= target_N if deeper else loop.last_net_N <= target_N
+
+    found = yield from mover.go_until(end, speed_mm_s, reached)
+    mover.unwatch()
+    if not found:
+        raise Stopped(
+            f"{name}: {target_N:g} N was not reached: {loop.last_net_N:.3f} N at the end of the allowed travel "
+            f"({end:.2f} mm, motor frame); lower the force, or allow more depth"
+        )
+    stiffness = stiffness_of(window)
+    loop.sink.event(
+        loop.clock.now(),
+        "force_reached",
+        {"step": name, "target_N": target_N, "net_N": loop.last_net_N, "stiffness_N_mm": stiffness},
+    )
+    return stiffness
+
+
+def hold_force(
+    loop: Loop, mover: Mover, target_N: float, seconds: float, stiffness_N_mm: float, speed_mm_s: float
+) -> Script[None]:
+    """Keep the net force at the target for so long by small moves, each a share of error / stiffness."""
+    until = loop.clock.now() + seconds
+    while loop.clock.now() < until:
+        count, total = 0, 0.0
+        seen = loop.force_count
+        while count < HOLD_FORCE_SAMPLES and loop.clock.now() < until:
+            if loop.force_count != seen:
+                seen = loop.force_count
+                count += 1
+                total += loop.last_net_N
+            yield
+        if count == 0:
+            return
+        error = target_N - total / count
+        move = HOLD_FORCE_GAIN * error / stiffness_N_mm
+        if abs(move) < MIN_CORRECTION_MM:
+            continue
+        goal = min(mover.here() + move, loop.monitor.envelope.deepest_mm)
+        yield from mover.go(goal, speed_mm_s)
+
+
+def stiffness_of(window: Window) -> float:
+    """Stiffness dF/dx over the last third of the way pressed, N/mm; at least a hundredth of the mean one."""
+    x = np.interp(window.force_time_s, window.motor_time_s, window.position_mm) if window.motor_time_s else np.array([])
+    force = np.array(window.net_N)
+    if x.size < 3 or np.ptp(x) <= 0:
+        return 1.0
+    last = np.abs(x - x[-1]) <= np.ptp(x) / 3.0
+    mean = float(np.ptp(force) / np.ptp(x))
+    if last.sum() < 3 or np.ptp(x[last]) <= 0:
+        return max(mean, 1e-3)
+    slope = float(np.polyfit(x[last], force[last], 1)[0])
+    return max(slope, 0.01 * mean, 1e-3)

@@ -1,0 +1,221 @@
+"""The one loop of a run: it services every port, judges every sample, and runs the script between.
+
+The script is a generator that yields whenever it has nothing to do before the next turn of the loop. Samples are
+recorded and judged as they arrive, whatever the script is doing; the loop waits on all ports at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from bench.errors import Stopped
+from bench.recording.types import StepMark
+from bench.run.axis import Axis
+from bench.run.rig import Rig
+from bench.run.safety import Monitor
+from drivers.errors import DriverError
+from drivers.loadcell import ForceSample
+from drivers.motor import MotorSample
+from drivers.wire import Pause, Steps
+
+T = TypeVar("T")
+Script = Generator[None, None, T]
+
+MAX_FAILED_POLLS = 3
+"""So many exchanges with the motor may fail in a row before the run stops; the stale limit usually comes first."""
+
+
+class Sink(Protocol):
+    """Where samples and events go: the recorder, or nothing."""
+
+    def motor(
+        self, time_s: float, received_s: float, position_mm: float, command_mm: float, force_N: float | None
+    ) -> None:
+        """One motor sample."""
+        ...
+
+    def force(
+        self,
+        time_s: float,
+        received_s: float,
+        net_N: float,
+        gross_N: float,
+        flags: tuple[str, ...] = (),
+        overload: bool = False,
+    ) -> None:
+        """One load-cell sample."""
+        ...
+
+    def event(self, time_s: float, name: str, data: dict[str, Any]) -> None:
+        """Something that happened."""
+        ...
+
+    def step(self, mark: StepMark) -> None:
+        """A stretch of the run begins."""
+        ...
+
+    def tick(self, now_s: float) -> None:
+        """Flush when it is time to."""
+        ...
+
+    def problem(self) -> str | None:
+        """Why nothing more can be recorded, if so."""
+        ...
+
+
+@dataclass
+class Window:
+    """Samples kept for the script while it wants them (tare, touch-off, force steps)."""
+
+    motor_time_s: list[float] = field(default_factory=list)
+    position_mm: list[float] = field(default_factory=list)
+    force_time_s: list[float] = field(default_factory=list)
+    net_N: list[float] = field(default_factory=list)
+    gross_N: list[float] = field(default_factory=list)
+
+
+class Loop:
+    """Rig, axis, monitor and sink, turned until the script ends or something stops it.
+
+    `tare_N` is subtracted from gross readings; `operator_stop` is looked at in every turn.
+    """
+
+    def __init__(self, rig: Rig, axis: Axis, monitor: Monitor, sink: Sink) -> None:
+        self.rig = rig
+        self.axis = axis
+        self.monitor = monitor
+        self.sink = sink
+        self.clock = rig.clock
+        self.tare_N = 0.0
+        self.measuring = False
+        self.window: Window | None = None
+        self.last_force: ForceSample | None = None
+        self.last_net_N = 0.0
+        self.last_motor: MotorSample | None = None
+        self.force_count = 0
+        self.motor_count = 0
+        self.operator_stop: str | None = None
+        self.on_turn: Callable[[float], None] | None = None
+        self._force_latency_s = 0.0
+        self._failed = 0
+
+    def run(self, script: Script[T]) -> T:
+        """Turn until the script returns; its value comes back.
+
+        Raises `Stopped` with the first cause when a limit is crossed, a device fails or the operator stops.
+        """
+        rig, axis, clock = self.rig, self.axis, self.clock
+        ports = rig.ports
+        while True:
+            for link in rig.links:
+                link.service()
+            now = clock.now()
+            self._take(now)
+            self.monitor.check()
+            try:
+                next(script)
+            except StopIteration as stop:
+                return stop.value  # type: ignore[no-any-return]  # StopIteration carries Any
+            except DriverError as error:
+                raise Stopped(str(error)) from error
+            axis.tick(now)
+            self.sink.tick(now)
+            if self.on_turn is not None:
+                self.on_turn(now)
+            wake = min(axis.wake_at(), now + 0.05)
+            for link in rig.links:
+                wake = min(wake, link.wake_at())
+            if self.measuring:
+                due = rig.load_cell.next_poll_s()
+                if due is not None:
+                    wake = min(wake, due)
+            clock.wait(ports, wake)
+
+    def begin_measuring(self) -> None:
+        """The load cell is running: from now on its silence counts."""
+        self.measuring = True
+        self._force_latency_s = self.rig.load_cell.latency_s()
+        self.monitor.expect_force_from(self.clock.now())
+
+    # -- for scripts -------------------------------------------------------------------------------------------
+
+    def perform(self, steps: Steps[T]) -> Script[T]:
+        """A driver's conversation as part of a script, while the loop keeps turning; raises its `DriverError`."""
+        link = self.rig.motor.link if steps is not None else None
+        return self.perform_on(steps, link)
+
+    def perform_on(self, steps: Steps[T], link: Any) -> Script[T]:
+        """Like `perform`, on any link."""
+        reply: Any = None
+        error: DriverError | None = None
+        while True:
+            try:
+                item = steps.throw(error) if error is not None else steps.send(reply)
+            except StopIteration as stop:
+                return stop.value  # type: ignore[no-any-return]  # StopIteration carries Any
+            reply, error = None, None
+            if isinstance(item, Pause):
+                yield from self.sleep(item.seconds)
+                continue
+            link.submit(item)
+            while not item.done:
+                yield
+            reply, error = item.value, item.error
+
+    def sleep(self, seconds: float) -> Script[None]:
+        """Let the loop turn for so long on the bench's clock."""
+        until = self.clock.now() + seconds
+        while self.clock.now() < until:
+            yield
+
+    # -- inside ------------------------------------------------------------------------------------------------
+
+    def _take(self, now: float) -> None:
+        """Record and judge everything that has come."""
+        monitor, sink = self.monitor, self.sink
+        window = self.window
+        if self.measuring:
+            for sample in self.rig.load_cell.samples():
+                net = sample.gross_N - self.tare_N
+                sink.force(sample.time_s, sample.received_s, net, sample.gross_N, sample.flags, sample.overload)
+                monitor.force(sample, net)
+                self.last_force = sample
+                self.last_net_N = net
+                self.force_count += 1
+                if window is not None:
+                    window.force_time_s.append(sample.time_s)
+                    window.net_N.append(net)
+                    window.gross_N.append(sample.gross_N)
+        axis = self.axis
+        for reading, command in axis.collect():
+            sink.motor(reading.time_s, reading.received_s, reading.position_mm, command, reading.force_N)
+            names = self.rig.motor.fault_names(reading.fault) if reading.fault else ()
+            monitor.motor(reading, command, names)
+            self.last_motor = reading
+            self.motor_count += 1
+            self._failed = 0
+            if window is not None:
+                window.motor_time_s.append(reading.time_s)
+                window.position_mm.append(reading.position_mm)
+        while axis.failures:
+            failure = axis.failures.pop(0)
+            self._failed += 1
+            sink.event(now, "motor_error", {"message": str(failure), "in_a_row": self._failed})
+            if self._failed >= MAX_FAILED_POLLS or self.rig.motor.link.broken is not None:
+                monitor.violate(str(failure))
+        broken = self.rig.load_cell.link.broken
+        if broken is not None and self.measuring:
+            monitor.violate(str(broken))
+        monitor.time(now, self._force_latency_s, axis.live)
+        if self.operator_stop is not None:
+            monitor.violate(self.operator_stop)
+        problem = sink.problem()
+        if problem is not None:
+            monitor.violate(f"the recording cannot go on: {problem}")
+
+    def newest_position(self) -> float:
+        """The last measured position, mm, motor frame (NaN before the first)."""
+        return self.last_motor.position_mm if self.last_motor is not None else math.nan

@@ -1,0 +1,211 @@
+"""One run from open ports to a closed recording; what is made of the data afterwards is not its business."""
+
+from __future__ import annotations
+
+import datetime
+import hashlib
+import importlib.metadata
+import math
+import platform
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+from bench.config import Bench
+from bench.errors import InputError, Stopped
+from bench.plan import Plan
+from bench.protocol import Protocol
+from bench.rates import motor_rate_Hz
+from bench.recording.writer import Recorder
+from bench.run.axis import Axis
+from bench.run.folder import RECORDING
+from bench.run.loop import Loop
+from bench.run.rig import Rig, is_simulated, open_rig
+from bench.run.safety import Envelope, Monitor
+from bench.run.script import Findings, Run
+from drivers.errors import DriverError, PortError
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+HOST_PACKAGES = ("padbench", "numpy", "scipy", "numba", "pymodbus", "pyserial", "mcap")
+
+Progress = Callable[[float, str], None]
+"""Told now and then: seconds of bench time since the start, and what the run is doing."""
+
+
+@dataclass(frozen=True)
+class Notes:
+    """What the person at the bench says about the run."""
+
+    sample: str | None = None
+    operator: str | None = None
+    note: str | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended: `cause` is None when the protocol ran to its end, else the first thing that went wrong."""
+
+    folder: Path
+    cause: str | None
+    findings: Findings
+    bench_seconds: float
+    motor_samples: int
+    force_samples: int
+
+    @property
+    def recording(self) -> Path:
+        """The MCAP file."""
+        return self.folder / RECORDING
+
+
+def run_protocol(
+    protocol: Protocol,
+    bench: Bench,
+    plan: Plan,
+    folder: Path,
+    *,
+    believed_text: str | None = None,
+    notes: Notes | None = None,
+    progress: Progress | None = None,
+) -> Outcome:
+    """Run the plan of a protocol on a bench and record it in `folder`.
+
+    The first thing that goes wrong stops the motor, is recorded and comes back as `Outcome.cause`; the data are kept.
+    Raises `InputError` where a port cannot be opened or the recording cannot be made: nothing has moved then.
+    """
+    try:
+        rig = open_rig(bench)
+    except PortError as error:
+        raise InputError(bench.place((error.device, "port")), error.message) from error
+    with rig:
+        mode = "inline" if rig.world is not None and rig.world.virtual else "process"
+        with Recorder(folder / RECORDING, rig.clock, mode=mode) as recorder:
+            recorder.begin(
+                _run_record(protocol, bench, notes or Notes()),
+                _host_record(),
+                simulation=rig.world.truth() if rig.world is not None else None,
+                attachments=_attachments(protocol, bench, believed_text),
+            )
+            return _run(rig, recorder, protocol, bench, plan, folder, progress)
+
+
+def _run(
+    rig: Rig, recorder: Recorder, protocol: Protocol, bench: Bench, plan: Plan, folder: Path, progress: Progress | None
+) -> Outcome:
+    rate = motor_rate_Hz(bench, protocol.sampling.motor)
+    loop = Loop(rig, Axis(rig.motor, 1.0 / rate), Monitor(_envelope(bench, plan)), recorder)
+    run = Run(loop, protocol, bench, plan)
+    started = rig.clock.now()
+    if progress is not None:
+        tell = progress
+        loop.on_turn = lambda now: tell(now - started, run.label)
+    cause = None
+    with _operator_stop(loop):
+        try:
+            loop.run(run.phases())
+        except Stopped as stop:
+            cause = stop.cause
+            recorder.log("error", cause)
+            _wind_down(loop, run, cause)
+    seconds = rig.clock.now() - started
+    problem = recorder.finish(
+        {
+            "status": "done" if cause is None else "stopped",
+            "cause": cause or "",
+            "bench_seconds": f"{seconds:.3f}",
+            "overruns": loop.axis.overruns,
+            "traffic": rig.traffic(),
+            "safe_state": run.found.safe_state,
+        }
+    )
+    return Outcome(folder, cause or problem, run.found, seconds, loop.motor_count, loop.force_count)
+
+
+def _wind_down(loop: Loop, run: Run, cause: str) -> None:
+    """Stop and make safe; a second failure is recorded beside the first, and never replaces it."""
+    try:
+        loop.run(run.wind_down(cause))
+    except (Stopped, DriverError) as error:
+        loop.sink.event(loop.clock.now(), "stop_incomplete", {"message": str(error)})
+
+
+@contextmanager
+def _operator_stop(loop: Loop) -> Iterator[None]:
+    """Ctrl-C, SIGTERM and SIGHUP stop the motor and keep the data; the loop sees them in its next turn."""
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        name = signal.Signals(number).name
+        loop.operator_stop = "stopped by the operator (Ctrl-C)" if name == "SIGINT" else f"stopped by signal {name}"
+
+    try:
+        before = {number: signal.signal(number, on_signal) for number in SIGNALS}
+    except ValueError:  # not the main thread: whoever started it stops it otherwise
+        yield
+        return
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _envelope(bench: Bench, plan: Plan) -> Envelope:
+    limits = bench.limits
+    return Envelope(
+        force_N=plan.limits.force_N,
+        tension_N=limits.tension,
+        gross_N=bench.load_cell.capacity,
+        position_mm=limits.position,
+        speed_mm_s=plan.limits.speed_mm_s,
+        following_error_mm=limits.following_error,
+        stale_s=limits.stale,
+        depth_mm=plan.limits.depth_mm if not plan.in_air else math.inf,
+    )
+
+
+def _run_record(protocol: Protocol, bench: Bench, notes: Notes) -> dict[str, object]:
+    """`padbench.run`: everything the data depend on, and what people call it."""
+    sample = protocol.sample.model_dump(exclude_none=True)
+    if notes.sample is not None:
+        sample["id"] = notes.sample
+    return {
+        "protocol": protocol.name,
+        "protocol_sha256": hashlib.sha256(protocol.text.encode()).hexdigest(),
+        "bench": bench.name,
+        "bench_sha256": hashlib.sha256(bench.text.encode()).hexdigest(),
+        "simulated": is_simulated(bench),
+        "seed": bench.simulation.seed if bench.simulation is not None and is_simulated(bench) else "",
+        "sample": sample,
+        "operator": notes.operator or "",
+        "note": notes.note or "",
+        "probe": bench.machine.probe.model_dump(exclude_none=True),
+        "motor": bench.motor.driver,
+        "load_cell": bench.load_cell.driver,
+        "timing": bench.timing.model_dump(mode="json"),
+    }
+
+
+def _host_record() -> dict[str, object]:
+    """`padbench.host`: what may differ between two runs of one seed."""
+    versions = {}
+    for package in HOST_PACKAGES:
+        try:
+            versions[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            versions[package] = "not installed"
+    return {
+        "started": datetime.datetime.now().astimezone().isoformat(timespec="milliseconds"),
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        "versions": versions,
+    }
+
+
+def _attachments(protocol: Protocol, bench: Bench, believed_text: str | None) -> dict[str, str | bytes]:
+    files: dict[str, str | bytes] = {"protocol.yaml": protocol.text, "bench.yaml": bench.text}
+    if believed_text is not None:
+        files["model.yaml"] = believed_text
+    return files

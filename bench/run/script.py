@@ -1,0 +1,234 @@
+"""The run itself, phase by phase: checks, home, tare, approach, then the planned segments, then the safe state.
+
+What is executed is the plan that preflight has checked. Its positions are in the pad frame; what goes to the axis is
+in the motor frame (surface added).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from bench.config import Bench
+from bench.errors import Stopped
+from bench.plan import Plan, Segment
+from bench.protocol import Approach, Protocol
+from bench.recording.types import StepMark
+from bench.run.approach import tare, touch_off
+from bench.run.force import hold_force, press
+from bench.run.loop import Loop, Script
+from bench.run.motion import Mover, Shape
+from bench.run.touchoff import Air, Surface
+from drivers.errors import DriverError
+from drivers.motor import MotorLimits, MotorSample
+
+SLOW_MM_S = 5.0
+"""Speed of moves that no protocol asks for (backing off before the tare, retracting after a stop)."""
+
+STOP_PATIENCE_S = 1.0
+"""How long a stopping axis is waited for before the safe state is applied all the same."""
+
+WATCHDOG_S = 0.1
+"""What a motor with a watchdog of its own is told: no command for so long, and it lets go."""
+
+
+@dataclass
+class Findings:
+    """What the run learned on the way."""
+
+    air: Air | None = None
+    surface: Surface | None = None
+    surface_mm: float = 0.0
+    safe_state: dict[str, Any] | None = None
+
+
+class Run:
+    """One protocol on one bench; `phases` is the script for `Loop.run`, `wind_down` what follows whatever happened."""
+
+    def __init__(self, loop: Loop, protocol: Protocol, bench: Bench, plan: Plan) -> None:
+        self.loop = loop
+        self.protocol = protocol
+        self.bench = bench
+        self.plan = plan
+        self.motor = loop.rig.motor
+        self.clock = loop.clock
+        ramp = next((segment for segment in plan.segments if segment.kind in ("ramp", "force_ramp")), None)
+        acceleration = ramp.acceleration_mm_s2 if ramp is not None else plan.limits.acceleration_mm_s2
+        self.mover = Mover(loop, Shape(acceleration, ramp.jerk_mm_s3 if ramp is not None else None))
+        self.found = Findings()
+        self.label = "starting"
+        self._stiffness_N_mm = 1.0
+
+    # -- phases ------------------------------------------------------------------------------------------------
+
+    def phases(self) -> Script[None]:
+        """Everything from the first byte to the safe state."""
+        yield from self.start_devices()
+        approach = self.protocol.approach
+        if isinstance(approach, Approach):
+            yield from self.meet_pad(approach)
+        else:
+            self._mark("tare", "tare", "air")
+            self.found.air = yield from tare(self.loop, self.mover, None, SLOW_MM_S)
+            self.loop.sink.event(self.clock.now(), "no_surface", {"surface_mm": 0.0})
+        for segment in self.plan.segments:
+            yield from self.segment(segment)
+        yield from self.make_safe()
+
+    def start_devices(self) -> Script[None]:
+        """Identify both devices, start the load cell first, then clamp, energise and home the motor."""
+        loop, motor, cell = self.loop, self.motor, self.loop.rig.load_cell
+        self.label = "connecting"
+        cell_identity = yield from loop.perform_on(cell.connect(), cell.link)
+        identity = yield from loop.perform(motor.connect())
+        loop.sink.event(
+            self.clock.now(),
+            "devices",
+            {
+                "motor": identity.model,
+                "load_cell": cell_identity.model,
+                **{f"motor_{key}": value for key, value in identity.details.items()},
+                **{f"load_cell_{key}": value for key, value in cell_identity.details.items()},
+            },
+        )
+        yield from loop.perform_on(cell.start(), cell.link)
+        loop.begin_measuring()
+        held = yield from loop.perform(motor.prepare(self._clamps()))
+        loop.sink.event(self.clock.now(), "clamps", dict(held))
+        yield from loop.perform(motor.energise())
+        yield from self._go_live()
+        homed = yield from loop.perform(motor.is_homed())
+        if not homed:
+            self.label = "homing"
+            loop.axis.go_silent()
+            loop.monitor.watch_following = False
+            yield from loop.perform(motor.home())
+            yield from self._go_live()
+            loop.monitor.watch_following = True
+            loop.sink.event(self.clock.now(), "homed", {})
+
+    def meet_pad(self, approach: Approach) -> Script[None]:
+        """Tare in air, find the surface, go to where step 1 starts."""
+        loop, found = self.loop, self.found
+        self.label = "tare"
+        self._mark("tare", "tare", "air")
+        found.air = yield from tare(loop, self.mover, approach, SLOW_MM_S)
+        self.label = "approach"
+        self._mark("approach", "approach", "ramp", speed_mm_s=approach.speed)
+        surface = yield from touch_off(loop, self.mover, approach, found.air, self._position_doubt(approach))
+        found.surface = surface
+        found.surface_mm = surface.position_mm
+        envelope = loop.monitor.envelope
+        deepest = max((part.target_mm for part in self.plan.segments if part.kind == "ramp"), default=0.0)
+        if surface.position_mm + deepest > envelope.position_mm[1]:
+            raise Stopped(
+                f"the pad's surface is at {surface.position_mm:.3f} mm: the deepest step ({deepest:g} mm) would go "
+                f"beyond limits.position ({envelope.position_mm[1]:g} mm); move the pad, or allow more travel"
+            )
+        envelope.surface_mm = surface.position_mm
+        yield from self.mover.go(self._motor_frame(self.plan.start_mm), approach.speed)
+
+    def segment(self, segment: Segment) -> Script[None]:
+        """One stretch of the plan: a ramp or a hold, by position or by force."""
+        loop, mover = self.loop, self.mover
+        self.label = segment.name
+        target = segment.target_mm
+        if segment.kind == "hold" and math.isnan(target):
+            target = mover.here() - self.found.surface_mm
+        self._mark(segment.name, segment.phase, segment.kind, target, segment.speed_mm_s)
+        if segment.kind == "ramp":
+            yield from mover.go(self._motor_frame(segment.target_mm), segment.speed_mm_s)
+        elif segment.kind == "force_ramp":
+            away = self._motor_frame(self.plan.start_mm)
+            self._stiffness_N_mm = yield from press(
+                loop, mover, segment.target_N, segment.name, segment.speed_mm_s, away
+            )
+        elif segment.kind == "force_hold":
+            stiffness = self._stiffness_N_mm
+            yield from hold_force(loop, mover, segment.target_N, segment.duration_s, stiffness, segment.speed_mm_s)
+        else:
+            yield from loop.sleep(segment.duration_s)
+
+    def make_safe(self) -> Script[None]:
+        """The bench file's safe state, read back from the device; then the load cell is quiet."""
+        loop = self.loop
+        self.label = "safe state"
+        state = self.bench.motor.safe_state
+        loop.axis.go_silent()
+        self.found.safe_state = yield from loop.perform(self.motor.safe_state(state))
+        loop.sink.event(self.clock.now(), "safe_state", {"state": state, **self.found.safe_state})
+        loop.measuring = False
+        cell = loop.rig.load_cell
+        yield from loop.perform_on(cell.stop(), cell.link)
+
+    def wind_down(self, cause: str) -> Script[None]:
+        """After a stop: decelerate, then the safe state. Nothing here lets an error hide the first cause."""
+        loop = self.loop
+        loop.monitor.stopping = True
+        loop.sink.event(self.clock.now(), "stopped", {"cause": cause})
+        self.label = "stopping"
+        if loop.axis.live:
+            give_up = self.clock.now() + STOP_PATIENCE_S
+            self.motor.link.drop_queue()
+            loop.axis.halt(self.bench.limits.acceleration)
+            while not loop.axis.ended(self.clock.now()) and self.clock.now() < give_up:
+                yield
+            if self.bench.motor.safe_state == "retract" and self.motor.link.broken is None:
+                yield from self._retract()
+        try:
+            yield from self.make_safe()
+        except DriverError as error:
+            loop.sink.event(self.clock.now(), "safe_state_failed", {"message": str(error)})
+
+    # -- inside ------------------------------------------------------------------------------------------------
+
+    def _go_live(self) -> Script[None]:
+        """Read where the axis is, and hold it there from now on."""
+        loop = self.loop
+        sample: MotorSample = yield from loop.perform(_one(self.motor.read()))
+        if sample.fault:
+            names = ", ".join(self.motor.fault_names(sample.fault))
+            raise Stopped(f"the motor reports a fault before any motion: {names}")
+        loop.last_motor = sample
+        loop.axis.go_live(sample.position_mm)
+        loop.monitor.expect_motor_from(self.clock.now())
+
+    def _retract(self) -> Script[None]:
+        """Out of the pad, slowly, as far as where the run started or the travel ends."""
+        lowest = self.loop.monitor.envelope.position_mm[0]
+        retract = self.protocol.approach.retract if isinstance(self.protocol.approach, Approach) else 0.0
+        target = self.found.surface_mm - retract if self.found.surface is not None else self.mover.here() - retract
+        target = min(max(lowest, target), self.mover.here())
+        give_up = self.clock.now() + 10.0
+        for _ in self.mover.go(target, SLOW_MM_S):
+            if self.clock.now() > give_up:
+                return
+            yield
+
+    def _clamps(self) -> MotorLimits:
+        limits = self.bench.limits
+        return MotorLimits(
+            speed_mm_s=limits.speed,
+            acceleration_mm_s2=limits.acceleration,
+            force_N=2.0 * limits.force + self.bench.motor.moving_mass * limits.acceleration / 1000.0,
+            position_mm=limits.position,
+            watchdog_s=WATCHDOG_S,
+        )
+
+    def _position_doubt(self, approach: Approach) -> float:
+        """What stamps that are off by half a poll do to the surface, at the speed it is measured with (mm)."""
+        return approach.speed / 8.0 * 0.5 * self.loop.axis.period_s
+
+    def _motor_frame(self, pad_mm: float) -> float:
+        return pad_mm + self.found.surface_mm
+
+    def _mark(
+        self, name: str, phase: str, kind: str, target_mm: float = math.nan, speed_mm_s: float = math.nan
+    ) -> None:
+        self.loop.sink.step(StepMark(self.clock.now(), name, phase, kind, target_mm, speed_mm_s))
+
+
+def _one(exchange: Any) -> Any:
+    """A conversation of one exchange."""
+    return (yield exchange)

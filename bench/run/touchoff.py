@@ -1,0 +1,148 @@
+"""Where does the pad begin? The surface, extrapolated from a slow approach, with its uncertainty.
+
+Near first contact every elastic law looks like F = k (x − x0)^n with n between 1 (exponential law, flat punch) and
+2.5 (steep power laws); a few hundredths of a newton cannot tell which. So each exponent is fitted, and the surface
+is the average over them weighted by how well they fit: the doubt about the law is part of the uncertainty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+EXPONENTS = (1.0, 1.5, 2.0, 2.5)
+"""Exponents n of first contact: 1 flat punch or exponential law (9), 1.5 sphere (Hertz), 2 cone, 2.5 power law."""
+
+SIGMAS = 5.0
+"""A touch must stand so many standard deviations of the air noise above the air level."""
+
+MIN_SAMPLES_IN_CONTACT = 4
+
+
+@dataclass(frozen=True)
+class Air:
+    """The load cell in free air: `mean_N`, `sigma_N` (one sample, trend removed), `drift_N_s`."""
+
+    mean_N: float
+    sigma_N: float
+    drift_N_s: float
+    samples: int
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The pad's surface in the motor frame and one standard deviation of it, mm.
+
+    `exponent` is the best-fitting n of first contact, `stiffness_N_mm` the secant stiffness of the approach's end.
+    """
+
+    position_mm: float
+    std_mm: float
+    exponent: float
+    stiffness_N_mm: float
+
+
+def air_of(time_s: Array, force_N: Array) -> Air:
+    """Level, noise and drift of force samples taken in air, both of shape (n,), n >= 8.
+
+    The noise is the spread about a straight line, by the median (1.4826 MAD), so that one bad sample does not count,
+    but never less than what quantisation leaves (step / sqrt 12).
+    """
+    t = time_s - time_s.mean()
+    slope, level = np.polyfit(t, force_N, 1)
+    rest = force_N - (level + slope * t)
+    sigma = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
+    values = np.unique(force_N)
+    step = float(np.diff(values).min()) if values.size > 1 else 0.0
+    return Air(
+        mean_N=float(level),
+        sigma_N=max(sigma, step / np.sqrt(12.0)),
+        drift_N_s=float(slope),
+        samples=int(force_N.size),
+    )
+
+
+def threshold_N(asked_N: float, air: Air) -> float:
+    """The force that counts as contact: what the protocol asks, but at least five sigma of the air noise."""
+    return max(asked_N, SIGMAS * air.sigma_N)
+
+
+def find_surface(position_mm: Array, force_N: Array, sigma_N: float, position_sigma_mm: float = 0.0) -> Surface | None:
+    """The surface from one approach: positions and net forces of shape (n,), in the order of time.
+
+    The part in air fixes the level (a constant, so that what drifted since the tare does not move the surface), the
+    part in contact the rise. Returns None when too little of the approach was in contact to say.
+    `position_sigma_mm` (encoder noise, jitter of stamps) adds to the result's standard deviation.
+    """
+    sigma = max(sigma_N, 1e-12)
+    best = [_fit_exponent(position_mm, force_N, sigma, n) for n in EXPONENTS]
+    fits = [fit for fit in best if fit is not None]
+    if not fits:
+        return None
+    chi2 = np.array([fit.chi2 for fit in fits])
+    weight = np.exp(-0.5 * (chi2 - chi2.min()))
+    weight /= weight.sum()
+    x0 = np.array([fit.x0_mm for fit in fits])
+    mean = float(weight @ x0)
+    variance = float(weight @ (np.array([fit.std_mm for fit in fits]) ** 2 + (x0 - mean) ** 2))
+    top = fits[int(np.argmin(chi2))]
+    depth = float(position_mm.max() - mean)
+    return Surface(
+        position_mm=mean,
+        std_mm=float(np.sqrt(variance + position_sigma_mm**2)),
+        exponent=top.exponent,
+        stiffness_N_mm=top.end_force_N / depth if depth > 0 else float("nan"),
+    )
+
+
+@dataclass(frozen=True)
+class _Fit:
+    x0_mm: float
+    std_mm: float
+    chi2: float
+    exponent: float
+    end_force_N: float
+
+
+def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> _Fit | None:
+    """Least squares of level + k·max(0, x − x0)^n: x0 by a grid that closes in, level and k in closed form."""
+    span = float(x.max() - x.min())
+    lo, hi = float(x.min()), float(x.max())
+    for _ in range(4):
+        grid = np.linspace(lo, hi, 41)
+        cost = np.array([_cost(x, force, x0, exponent)[0] for x0 in grid])
+        k = int(np.argmin(cost))
+        lo, hi = grid[max(k - 2, 0)], grid[min(k + 2, grid.size - 1)]
+    x0 = float(grid[k])
+    if (x > x0).sum() < MIN_SAMPLES_IN_CONTACT:
+        return None
+    chi2, gain, level = _cost(x, force, x0, exponent)
+    if gain <= 0:
+        return None
+    # Standard deviation from the Gauss-Newton normal matrix of (level, k, x0).
+    rise = np.maximum(x - x0, 0.0)
+    slope = np.where(rise > 0, gain * exponent * np.maximum(rise, 1e-9 * span) ** (exponent - 1.0), 0.0)
+    jacobian = np.column_stack([np.ones_like(x), rise**exponent, -slope])
+    scale = np.maximum(np.abs(jacobian).max(axis=0), 1e-300)
+    normal = (jacobian / scale).T @ (jacobian / scale)
+    try:
+        covariance = np.linalg.inv(normal) * sigma**2
+    except np.linalg.LinAlgError:
+        return None
+    std = float(np.sqrt(covariance[2, 2])) / scale[2]
+    return _Fit(x0, std, chi2 / sigma**2, exponent, gain * float(rise.max()) ** exponent)
+
+
+def _cost(x: Array, force: Array, x0: float, exponent: float) -> tuple[float, float, float]:
+    """Sum of squares, k and level of the best line in (x − x0)^n; shape of x and force (n,)."""
+    rise = np.maximum(x - x0, 0.0) ** exponent
+    centred = rise - rise.mean()
+    power = float(centred @ centred)
+    gain = float(centred @ force) / power if power > 0 else 0.0
+    level = float(force.mean() - gain * rise.mean())
+    rest = force - level - gain * rise
+    return float(rest @ rest), gain, level

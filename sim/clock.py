@@ -1,0 +1,156 @@
+"""The clock of a simulated bench: virtual, where waiting jumps to the next event, or the wall's.
+
+Everything that happens by itself in a simulated bench (a frame's last byte arrives, a watchdog expires, an
+amplifier starts its next line) is an event scheduled here. Events run in time order, and in the order they were
+scheduled where times are equal, so that a run is a function of its seed. An event is given the time it was
+scheduled for, which on the wall clock can be a little earlier than `now()`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import heapq
+import select
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+VIRTUAL_EPOCH_NS = 1_767_225_600_000_000_000
+"""Virtual time starts at 2026-01-01T00:00:00Z always: one seed, the same bytes."""
+
+WAKE_MARGIN_S = 1.5e-4
+"""A sleeping process wakes up to about this late; the last stretch before an event is spun."""
+
+
+class Deadlock(RuntimeError):
+    """Waiting without end on a virtual clock on which nothing is going to happen."""
+
+
+class Event:
+    """A scheduled callback; `cancel` keeps it from running."""
+
+    __slots__ = ("at_s", "callback")
+
+    def __init__(self, at_s: float, callback: Callable[[float], None]) -> None:
+        self.at_s = at_s
+        self.callback: Callable[[float], None] | None = callback
+
+    def cancel(self) -> None:
+        """Keep it from running; harmless when it has run."""
+        self.callback = None
+
+
+class SimClock:
+    """Time of one simulated bench, in seconds since it was made.
+
+    `wall=False`: virtual; `wait` moves the time. `wall=True`: real time passes, the same events run when they are
+    due, and ports with a descriptor (pseudo-terminals, sockets) are waited on as well.
+    `busy_until_s`: on the wall clock, `wait` polls its descriptors without sleeping until then; for answers that
+    must not be late by a process wake-up.
+    """
+
+    def __init__(self, wall: bool = False) -> None:
+        self.wall = wall
+        self.epoch_ns = time.time_ns() if wall else VIRTUAL_EPOCH_NS
+        self.busy_until_s = 0.0
+        self._start_s = time.perf_counter()
+        self._now_s = 0.0
+        self._events: list[tuple[float, int, Event]] = []
+        self._count = 0
+        self._arrival = False
+        if wall:
+            _fine_timers()
+
+    def now(self) -> float:
+        """Seconds since the clock was made."""
+        return time.perf_counter() - self._start_s if self.wall else self._now_s
+
+    def schedule(self, at_s: float, callback: Callable[[float], None]) -> Event:
+        """Have `callback(at_s)` run when the time is `at_s`; what lies in the past runs with the next wait."""
+        event = Event(at_s, callback)
+        self._count += 1
+        heapq.heappush(self._events, (at_s, self._count, event))
+        return event
+
+    def next_event_s(self) -> float:
+        """When the next event is due; infinity if there is none."""
+        events = self._events
+        while events and events[0][2].callback is None:
+            heapq.heappop(events)
+        return events[0][0] if events else float("inf")
+
+    def arrived(self) -> None:
+        """Tell a waiting caller that a port has received something (called by the lines)."""
+        self._arrival = True
+
+    def run_due(self) -> None:
+        """Run the events that are due by now; the wall clock's ports do so before they are read."""
+        self._run_until(self.now())
+
+    def wait(self, ports: Sequence[Any], until_s: float) -> None:
+        """Return as soon as one of the ports has bytes to read, at the latest at `until_s`.
+
+        `ports` are pyserial ports (`in_waiting`; on the wall clock those with a `fileno` are selected on).
+        A frame wakes a waiting caller when its last byte has arrived, and not at each byte.
+
+        Raises `Deadlock` on a virtual clock where `until_s` is infinite and nothing is scheduled.
+        """
+        if self.wall:
+            self._wait_wall(ports, until_s)
+            return
+        for port in ports:
+            if port.in_waiting:
+                return
+        events = self._events
+        self._arrival = False
+        while events and events[0][0] <= until_s:
+            at_s, _, event = heapq.heappop(events)
+            callback = event.callback
+            if callback is None:
+                continue
+            if at_s > self._now_s:
+                self._now_s = at_s
+            callback(at_s)
+            if self._arrival:
+                self._arrival = False
+                for port in ports:
+                    if port.in_waiting:
+                        return
+        if until_s == float("inf"):
+            raise Deadlock("waiting for bytes that nothing on this simulated bench is going to send")
+        if until_s > self._now_s:
+            self._now_s = until_s
+
+    def _run_until(self, until_s: float) -> None:
+        events = self._events
+        while events and events[0][0] <= until_s:
+            at_s, _, event = heapq.heappop(events)
+            if event.callback is not None:
+                event.callback(at_s)
+
+    def _wait_wall(self, ports: Sequence[Any], until_s: float) -> None:
+        simulated = [port for port in ports if hasattr(port, "line")]
+        descriptors = [port.fileno() for port in ports if not hasattr(port, "line")]
+        while True:
+            self.run_due()
+            for port in simulated:
+                if port.in_waiting:
+                    return
+            now_s = self.now()
+            wake_s = min(until_s, self.next_event_s())
+            margin_s = 0.0 if now_s < self.busy_until_s else wake_s - now_s - WAKE_MARGIN_S
+            if descriptors:
+                if select.select(descriptors, [], [], max(0.0, min(margin_s, 1.0)))[0]:
+                    return
+            elif margin_s > 0.0:
+                time.sleep(min(margin_s, 1.0))
+            if now_s >= until_s:
+                return
+
+
+def _fine_timers() -> None:
+    """Have Linux wake this thread from sleeps to the microsecond, not 50 µs later (a timer's default slack)."""
+    if sys.platform == "linux":
+        pr_set_timerslack = 29
+        ctypes.CDLL(None).prctl(pr_set_timerslack, 1000, 0, 0, 0)

@@ -1,0 +1,114 @@
+"""What an effect is: a physical cause, as blocks at places of the plant, with its parameters.
+
+An effect file in this folder defines `EFFECT`; that alone registers it. A form (member of the family) names its
+parameters and supplies steps (sim.jit.block) for one or several places:
+
+| place | input → output | meaning |
+|---|---|---|
+| report | true position, mm → reported position | static, slope near 1 |
+| play | motor side → after the play, mm | no feedback |
+| frame | force at the cell, N → deflection, mm | solved together with the pad |
+| probe | probe position, mm → force at the probe, N | added to the pad's, felt by the cell |
+| depth | depth → depth, mm | chained |
+| elastic | depth, mm → factor on F^e | multiplied |
+| rate | depth, mm → factor on all rates | multiplied |
+| contact | depth, mm → force of the pad's own, N | added while in contact; with it, too, the pad cannot pull |
+| gap | gap between pad and probe, mm (0 in contact) → force, N | added between the two: may pull |
+| sensor | force at the cell → force in the path, N | chained, on the whole time grid |
+| sampling | force → force as reported, N | chained, once a force sample |
+
+All blocks of one effect share one state vector, which starts as `state`, and one parameter vector: the form's parameters
+in their order, or what `pack` makes of them. A step from `frame` to `gap` is run several times on trial copies of the state, so it
+may keep nothing elsewhere. A step must take dt = 0 (the first sample of all, and stamps that repeat).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.jit import Block
+from sim.kernel import PLACES
+
+if TYPE_CHECKING:
+    from sim.pad import Pad
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number: its unit (as written in files), what physics allows, and a typical value to start a fit from."""
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    typical: float
+    what: str
+    required: bool = False
+    default: float | None = None
+    """Value when a file leaves it out; `typical` where None."""
+
+    @property
+    def if_left_out(self) -> float:
+        """The value of an optional parameter that a file does not give."""
+        return self.typical if self.default is None else self.default
+
+
+@dataclass(frozen=True)
+class Form:
+    """One member of an effect's family."""
+
+    name: str
+    what: str
+    parameters: tuple[Parameter, ...]
+    blocks: Mapping[str, Block] = field(default_factory=dict)
+    state: tuple[float, ...] = ()
+    pack: Callable[[Mapping[str, float]], tuple[float, ...]] | None = None
+    time_shift: Callable[[Mapping[str, float], Array], Array] | None = None
+    """Stamp of a force sample (s) → when that force was felt (s): late or drifting force clocks."""
+    amend: Callable[[Pad, Mapping[str, float]], Pad] | None = None
+    """Another pad in place of the one described: another law, a further mode, contact that lets go."""
+
+    def __post_init__(self) -> None:
+        unknown = set(self.blocks) - (set(PLACES) - {"law"})
+        if unknown:
+            raise ValueError(f"form {self.name}: no place {', '.join(sorted(unknown))}")
+
+    def vector(self, values: Mapping[str, float]) -> tuple[float, ...]:
+        """The parameter vector the blocks read."""
+        if self.pack is not None:
+            return self.pack(values)
+        return tuple(values[parameter.name] for parameter in self.parameters)
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A physical cause. `forms[0]` is the one meant when a file names none."""
+
+    id: str
+    what: str
+    forms: tuple[Form, ...]
+
+    def form(self, name: str | None = None) -> Form:
+        """The form `name`, or the first; KeyError when there is none of that name."""
+        if name is None:
+            return self.forms[0]
+        for form in self.forms:
+            if form.name == name:
+                return form
+        raise KeyError(name)
+
+
+@dataclass(frozen=True)
+class Active:
+    """A form with numbers: what a model holds."""
+
+    effect: Effect
+    form: Form
+    values: Mapping[str, float]

@@ -1,0 +1,105 @@
+"""Friction at the probe, felt by the load cell: ±F_c against the direction of motion.
+
+Force as a function of speed alone jumps at reversal and has no single value at rest, which no implicit step can solve and
+no real bearing shows. All forms therefore slide in over a short presliding distance: the force depends on the path
+since the last reversal, rises with it, and is a continuous function of position.
+
+- `coulomb`: Prandtl's element, a spring F_c/presliding in series with a slider of F_c. Between reversals, beyond
+  the presliding distance, it is exactly ±F_c at any speed.
+- `presliding`: Dahl's model, dF/dy = (F_c/d)(1 − sgn(v) F/F_c): the approach to F_c is gradual (P. R. Dahl, A solid
+  friction model, Aerospace Corporation TOR-0158(3107-18)-1, 1968). Integrated exactly over a step.
+- `stribeck`: Prandtl's element whose slider holds F_c + (F_s − F_c) e^(−(v/v_s)^2) + viscous v: breaking away takes more
+  than sliding, and oil adds with speed (B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, A survey of models,
+  analysis tools and compensation methods for the control of machines with friction, Automatica 30, 1994, 1083-1138).
+
+State: last position, force, whether there was a position yet. A first position is rest without friction force.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+_LAST, _FORCE, _STARTED = range(3)
+
+
+@block
+def coulomb(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element; p = (coulomb, presliding)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    force = state[_FORCE] + moved * (p[0] / p[1])
+    force = max(-p[0], min(p[0], force))
+    state[_FORCE] = force
+    return force
+
+
+@block
+def dahl(dt: float, y: float, state: State, p: State) -> float:
+    """Dahl's model over the distance moved; p = (coulomb, presliding)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    ceiling = p[0] if moved >= 0.0 else -p[0]
+    force = state[_FORCE] + (ceiling - state[_FORCE]) * -math.expm1(-abs(moved) / p[1])
+    state[_FORCE] = force
+    return force
+
+
+@block
+def stribeck(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element with a slider that depends on speed; p = (coulomb, static, stribeck_speed, viscous, presliding)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    speed = abs(moved) / dt if dt > 0.0 else 0.0
+    limit = p[0] + (p[1] - p[0]) * math.exp(-((speed / p[2]) ** 2))
+    force = state[_FORCE] + moved * (p[0] / p[4])
+    force = max(-limit, min(limit, force))
+    state[_FORCE] = force
+    viscous = p[3] * moved / dt if dt > 0.0 else 0.0
+    return force + viscous
+
+
+_COULOMB = Parameter("coulomb", "N", 0.0, 50.0, 0.05, "friction force while sliding, on either side", required=True)
+_PRESLIDING = Parameter("presliding", "mm", 1e-6, 1.0, 0.001, "distance over which friction builds up after a reversal")
+
+EFFECT = Effect(
+    id="friction",
+    what="Friction at the probe acts against its motion and is felt by the load cell.",
+    forms=(
+        Form(
+            name="coulomb",
+            what="constant against the direction of motion",
+            parameters=(_COULOMB, _PRESLIDING),
+            blocks={"probe": coulomb},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="stribeck",
+            what="more to break away than to slide, and a part that grows with speed",
+            parameters=(
+                _COULOMB,
+                Parameter("static", "N", 0.0, 50.0, 0.08, "friction force near rest"),
+                Parameter("stribeck_speed", "mm/s", 1e-3, 1e3, 2.0, "speed at which the excess at rest has fallen to 1/e"),
+                Parameter("viscous", "N*s/mm", 0.0, 10.0, 0.0, "further force per speed"),
+                _PRESLIDING,
+            ),
+            blocks={"probe": stribeck},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="presliding",
+            what="gradual build-up after each reversal (Dahl)",
+            parameters=(
+                _COULOMB,
+                Parameter("presliding", "mm", 1e-6, 5.0, 0.02, "distance over which friction builds up after a reversal"),
+            ),
+            blocks={"probe": dahl},
+            state=(0.0, 0.0, 0.0),
+        ),
+    ),
+)

@@ -1,0 +1,323 @@
+"""The compiled loop of the plant: one step, and the same step over arrays.
+
+A plant is a *program* (int64: sizes, then the blocks by place), its *parameters* and its *state* (float64); see
+sim/program.py for how they are laid out. One step, from motor side to load cell:
+
+    x ─ play ─►(+)─► y ─ depth ─► δ ─ law·elastic ─► F^e ─ relaxation ─► + contact, gap ─► F_pad ─► + probe(y) ─► F_cell
+                ▲ −                                                                                         │
+                └────────────────────────────────── frame ◄─────────────────────────────────────────────────┘
+
+Everything between frame and cell is inside a loop without delay: y + Σ frame(F_cell(y)) = x is solved in every step, to
+rounding, on trial copies of the state, and the copy at the solution becomes the state.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.jit import call_block, compiled
+
+Array = NDArray[np.float64]
+Program = NDArray[np.int64]
+
+PLACES = (
+    "report",
+    "play",
+    "frame",
+    "probe",
+    "depth",
+    "law",
+    "elastic",
+    "rate",
+    "contact",
+    "gap",
+    "sensor",
+    "sampling",
+)
+REPORT, PLAY, FRAME, PROBE, DEPTH, LAW, ELASTIC, RATE, CONTACT, GAP, SENSOR, SAMPLING = range(12)
+
+# program: sizes and offsets, where each place's blocks start, then (address, state, parameters) a block
+MODES, UNILATERAL, INNER, INNER_SIZE, TRIAL, SCRATCH, RELAX, CACHE, STARTS = range(9)
+ROWS = STARTS + len(PLACES) + 1
+
+# state: what the solver keeps …
+X, Y, CELL, SLOPE, RESIDUAL, TRIAL_CELL = range(6)
+OUTER = 6
+# … and the pad's own, at INNER and in its trial copies: w_1 … w_r follow
+FE, PAD_DEPTH, PAD_FORCE, SURFACE, W = range(5)
+
+_TOLERANCE = 4e-15
+
+
+@compiled("float64(float64)")
+def ramp_gain(x: float) -> float:
+    """φ(x) = (1 − e^(−x)) / x, the ramp-invariant gain of a mode with x = ν dt; 1 at x = 0."""
+    if x < 0.02:  # the series is exact to rounding here, and quicker than expm1
+        return 1.0 - x / 2 * (1.0 - x / 3 * (1.0 - x / 4 * (1.0 - x / 5 * (1.0 - x / 6 * (1.0 - x / 7)))))
+    return -math.expm1(-x) / x
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], int64, int64, float64, float64)")
+def chain(program: Program, params: Array, state: Array, shift: int, place: int, dt: float, u: float) -> float:
+    """The blocks of a place one after the other; state offsets moved by `shift` (a trial copy)."""
+    for k in range(program[STARTS + place], program[STARTS + place + 1]):
+        row = ROWS + 3 * k
+        u = call_block(program[row], dt, u, state, program[row + 1] + shift, params, program[row + 2])
+    return u
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], int64, int64, float64, float64)")
+def total(program: Program, params: Array, state: Array, shift: int, place: int, dt: float, u: float) -> float:
+    """Sum of the blocks of a place."""
+    result = 0.0
+    for k in range(program[STARTS + place], program[STARTS + place + 1]):
+        row = ROWS + 3 * k
+        result += call_block(program[row], dt, u, state, program[row + 1] + shift, params, program[row + 2])
+    return result
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], int64, int64, float64, float64)")
+def product(program: Program, params: Array, state: Array, shift: int, place: int, dt: float, u: float) -> float:
+    """Product of the blocks of a place."""
+    result = 1.0
+    for k in range(program[STARTS + place], program[STARTS + place + 1]):
+        row = ROWS + 3 * k
+        result *= call_block(program[row], dt, u, state, program[row + 1] + shift, params, program[row + 2])
+    return result
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], int64, float64, float64, float64, float64, float64)")
+def surface_force(
+    program: Program, params: Array, state: Array, shift: int, dt: float, s: float, A: float, B: float, factor: float
+) -> float:
+    """Force of the pad were its surface at depth `s`: A + B F^e(s) + contact(s), contact blocks on a scratch copy."""
+    inner, scratch = program[INNER], program[SCRATCH]
+    for k in range(program[INNER_SIZE]):
+        state[scratch + k] = state[inner + shift + k]
+    aside = scratch - inner
+    Fe = factor * chain(program, params, state, aside, LAW, dt, s)
+    return A + B * Fe + total(program, params, state, aside, CONTACT, dt, s)
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], int64, float64, float64, float64, float64, float64)")
+def free_surface(
+    program: Program, params: Array, state: Array, shift: int, dt: float, low: float, A: float, B: float, factor: float
+) -> float:
+    """Depth at which a pad that has let go carries no force; `low` is a depth where the force would be negative."""
+    f_low = surface_force(program, params, state, shift, dt, low, A, B, factor)
+    high = max(low, state[program[INNER] + shift + SURFACE])
+    width = max(high - low, 1e-6)
+    high = low + width
+    f_high = surface_force(program, params, state, shift, dt, high, A, B, factor)
+    for _ in range(60):
+        if not f_high < 0.0:
+            break
+        low, f_low = high, f_high
+        width *= 2.0
+        high += width
+        f_high = surface_force(program, params, state, shift, dt, high, A, B, factor)
+    side = 0
+    for _ in range(200):
+        s = high - f_high * (high - low) / (f_high - f_low)
+        if not low < s < high:
+            s = 0.5 * (low + high)
+        if not low < s < high:
+            break
+        f = surface_force(program, params, state, shift, dt, s, A, B, factor)
+        if f < 0.0:
+            low, f_low = s, f
+            if side == -1:  # Illinois: the end that stays loses half its weight
+                f_high *= 0.5
+            side = -1
+        else:
+            high, f_high = s, f
+            if side == 1:
+                f_low *= 0.5
+            side = 1
+        if abs(f) <= 1e-15 or high - low <= 1e-15 * (1.0 + abs(high)):
+            break
+    return high
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], int64, float64, float64)")
+def pad_step(program: Program, params: Array, state: Array, shift: int, dt: float, y: float) -> float:
+    """One step of everything between probe position and load cell, on the state moved by `shift`. F_cell in N."""
+    r = program[MODES]
+    pad = program[INNER] + shift
+    relax, cache = program[RELAX], program[CACHE]
+    depth = chain(program, params, state, shift, DEPTH, dt, y)
+    factor = product(program, params, state, shift, ELASTIC, dt, depth)
+    Fe = factor * chain(program, params, state, shift, LAW, dt, depth)
+    scaled = dt * product(program, params, state, shift, RATE, dt, depth)
+    if state[cache] != scaled:  # decay and gain of the modes are kept while the step stays the same
+        state[cache] = scaled
+        for i in range(r):
+            x = params[relax + 1 + r + i] * scaled
+            gain = ramp_gain(x)
+            state[cache + 1 + i] = 1.0 - x * gain
+            state[cache + 1 + r + i] = gain
+    old = state[pad + FE]
+    A = 0.0
+    B = params[relax]
+    for i in range(r):
+        c, gain = params[relax + 1 + i], state[cache + 1 + r + i]
+        A += c * (state[cache + 1 + i] * state[pad + W + i] - gain * old)
+        B += c * gain
+    F = A + B * Fe
+    surface = max(depth, 0.0)
+    plain = program[STARTS + CONTACT] == program[STARTS + CONTACT + 1]
+    simple = plain and program[STARTS + GAP] == program[STARTS + GAP + 1]
+    if program[UNILATERAL] == 0:
+        F += total(program, params, state, shift, CONTACT, dt, depth)
+    elif simple:
+        if F < 0.0:
+            Fe = -A / B if B > 0.0 else 0.0
+            F = 0.0
+    else:
+        if surface_force(program, params, state, shift, dt, depth, A, B, factor) < 0.0:
+            surface = max(0.0, free_surface(program, params, state, shift, dt, depth, A, B, factor))
+            if plain:
+                Fe = -A / B if B > 0.0 else 0.0
+            else:
+                Fe = factor * chain(program, params, state, shift, LAW, dt, surface)
+            total(program, params, state, shift, CONTACT, dt, surface)
+            F = 0.0
+        else:
+            F += total(program, params, state, shift, CONTACT, dt, depth)
+    for i in range(r):
+        w = state[pad + W + i]
+        state[pad + W + i] = state[cache + 1 + i] * w + state[cache + 1 + r + i] * (Fe - old)
+    if not simple:
+        F += total(program, params, state, shift, GAP, dt, surface - depth)
+    state[pad + FE] = Fe
+    state[pad + PAD_DEPTH] = depth
+    state[pad + PAD_FORCE] = F
+    state[pad + SURFACE] = surface
+    return F + total(program, params, state, shift, PROBE, dt, y)
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], float64, float64, float64)")
+def imbalance(program: Program, params: Array, state: Array, dt: float, x: float, y: float) -> float:
+    """y + Σ frame(F_cell(y)) − x, on a fresh trial copy of the state."""
+    inner, trial = program[INNER], program[TRIAL]
+    for k in range(program[INNER_SIZE]):
+        state[trial + k] = state[inner + k]
+    shift = trial - inner
+    F = pad_step(program, params, state, shift, dt, y)
+    state[TRIAL_CELL] = F
+    return y + total(program, params, state, shift, FRAME, dt, F) - x
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], float64, float64)")
+def solve(program: Program, params: Array, state: Array, dt: float, x: float) -> float:
+    """Probe position y with y + Σ frame(F_cell(y)) = x; the state becomes the one at y.
+
+    Secant steps kept within a bracket once there is one. A passive frame and pad have a slope of at least 1, so that a
+    full step of the imbalance brackets the root; where some block pushes the other way the step is doubled.
+    """
+    slope = state[SLOPE]
+    a = state[Y] + (x - state[X]) * slope
+    f_a = imbalance(program, params, state, dt, x, a)
+    b, f_b = a, f_a
+    tolerance = _TOLERANCE * max(abs(x), abs(a), 0.1)
+    if abs(f_a) > tolerance:
+        low, high = -math.inf, math.inf
+        if f_a < 0.0:
+            low = a
+        else:
+            high = a
+        b = a - f_a * slope
+        reach = 1.0
+        stale = 0
+        for n in range(200):
+            f_b = imbalance(program, params, state, dt, x, b)
+            if n == 0 and abs(b - a) > 1e-7 and f_b != f_a:
+                state[SLOPE] = min(1.0, max(0.01, (b - a) / (f_b - f_a)))
+            if abs(f_b) <= tolerance:
+                break
+            before = high - low
+            if f_b < 0.0:
+                low = b
+            else:
+                high = b
+            c = b - f_b * (b - a) / (f_b - f_a) if f_b != f_a else math.nan
+            if high - low < math.inf:
+                stale = stale + 1 if high - low > 0.5 * before else 0
+                if not low < c < high or stale > 3:
+                    c = 0.5 * (low + high)
+                    stale = 0
+                if not low < c < high:  # nothing lies between: a jump, or rounding
+                    break
+            else:
+                if not abs(c - b) <= abs(f_b) * reach or (c - b) * f_b >= 0.0:
+                    c = b - f_b * reach
+                    reach *= 2.0
+                if c == b:
+                    break
+            a, f_a = b, f_b
+            b = c
+    inner, trial = program[INNER], program[TRIAL]
+    for k in range(program[INNER_SIZE]):
+        state[inner + k] = state[trial + k]
+    state[RESIDUAL] = f_b
+    state[CELL] = state[TRIAL_CELL]
+    return b
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], float64, float64)")
+def plant_step(program: Program, params: Array, state: Array, dt: float, x: float) -> float:
+    """One step of the plant: motor-side position `x` in mm, `dt` seconds after the last; force at the cell in N."""
+    x = chain(program, params, state, 0, PLAY, dt, x)
+    if program[STARTS + FRAME] == program[STARTS + FRAME + 1]:
+        y = x
+        state[CELL] = pad_step(program, params, state, 0, dt, y)
+    else:
+        y = solve(program, params, state, dt, x)
+    state[X] = x
+    state[Y] = y
+    return state[CELL]
+
+
+@compiled("void(int64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
+def run(program: Program, params: Array, state: Array, dt: Array, x: Array, force: Array, probe: Array) -> None:
+    """`plant_step` over arrays of shape (n,): force at the cell and probe position are written to the last two."""
+    for n in range(x.size):
+        force[n] = plant_step(program, params, state, dt[n], x[n])
+        probe[n] = state[Y]
+
+
+@compiled("void(int64[::1], float64[::1], float64[::1], int64, float64[::1], float64[::1])")
+def run_chain(program: Program, params: Array, state: Array, place: int, dt: Array, u: Array) -> None:
+    """The blocks of a place over an array, in place."""
+    for n in range(u.size):
+        u[n] = chain(program, params, state, 0, place, dt[n], u[n])
+
+
+@compiled("void(int64[::1], float64[::1], float64[::1], float64[::1])")
+def unreport(program: Program, params: Array, state: Array, u: Array) -> None:
+    """True positions from reported ones, in place. `report` blocks are static and of slope near 1."""
+    for n in range(u.size):
+        y = u[n]
+        for _ in range(60):
+            error = chain(program, params, state, 0, REPORT, 0.0, y) - u[n]
+            y -= error
+            if abs(error) <= 1e-15 * max(abs(y), 0.1):
+                break
+        u[n] = y
+
+
+@compiled("void(int64, float64[::1], float64[::1], float64[::1])")
+def apply(address: int, params: Array, u: Array, out: Array) -> None:
+    """One block without memory over an array."""
+    state = np.zeros(1)
+    for n in range(u.size):
+        out[n] = call_block(address, 0.0, u[n], state, 0, params, 0)
+
+
+def as_vector(values: Any) -> Array:
+    """A contiguous float64 vector, as the compiled functions take them."""
+    return np.ascontiguousarray(values, dtype=np.float64)

@@ -1,0 +1,247 @@
+"""The pad as a Hammerstein plant, equations (5) to (14), with its effects: streaming and over arrays.
+
+Both forms run the same compiled step (sim/kernel.py) on the same layout, so they agree to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sim import kernel as k
+from sim.effects.base import Active
+from sim.elastic import ElasticLaw
+from sim.program import Layout, lay_out
+from sim.relaxation import Relaxation
+
+Array = NDArray[np.float64]
+
+SAME_INSTANT_S = 1e-9
+"""Stamps closer than this are one instant: differences over less are rounding."""
+
+
+@dataclass(frozen=True)
+class Pad:
+    """Elastic response, relaxation, and whether the pad lets go (`unilateral`) or pulls (`bonded`)."""
+
+    law: ElasticLaw
+    relaxation: Relaxation
+    unilateral: bool
+
+
+class Cascade:
+    """A pad with its effects, ready to run. Immutable; plants made from it have their own state."""
+
+    def __init__(self, pad: Pad, effects: Sequence[Active] = ()) -> None:
+        for active in effects:
+            if active.form.amend is not None:
+                pad = active.form.amend(pad, active.values)
+        self.pad = pad
+        self.effects = tuple(effects)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The arrays that the compiled loop reads; compiles what is not compiled yet."""
+        return lay_out(self.pad, self.effects)
+
+    def plant(self) -> Plant:
+        """A plant at rest, never touched."""
+        return Plant(self.layout)
+
+    @property
+    def shifts_time(self) -> bool:
+        """Whether some effect separates a force's stamp from when it was felt."""
+        return any(active.form.time_shift is not None for active in self.effects)
+
+    def felt_at(self, stamp_s: ArrayLike) -> Array:
+        """When a force reported with a stamp was felt, s; the stamp itself without delays or drifting clocks."""
+        t = np.asarray(stamp_s, dtype=np.float64)
+        for active in self.effects:
+            if active.form.time_shift is not None:
+                t = active.form.time_shift(active.values, t)
+        return t
+
+    def simulate(self, time_s: ArrayLike, position_mm: ArrayLike) -> Array:
+        """Force as reported, N, shape (n,), for reported pad-frame positions (n,) at times (n,) that do not fall.
+
+        The first position is reached in an instant from rest out of contact: a depth there at the start is a step.
+        Raises ValueError for arrays that do not match, are not finite, or times that fall.
+        """
+        if self.shifts_time:
+            return self.simulate_at(time_s, position_mm, time_s)
+        time, position = checked(time_s, position_mm)
+        force, _ = self._grid(time, self._true(position))
+        return self._sampled(time, force)
+
+    def simulate_at(self, position_time_s: ArrayLike, position_mm: ArrayLike, force_time_s: ArrayLike) -> Array:
+        """Force as reported at force times (m,), for positions (n,) at their own times, linear between them.
+
+        The plant runs on the union of both grids, so neither channel is resampled. Before the first and after the
+        last position stamp the position stands still. Of positions with one stamp the last holds.
+        """
+        time, position = checked(position_time_s, position_mm)
+        force_time = k.as_vector(force_time_s)
+        check_times(force_time, "force")
+        if time.size == 0:
+            raise ValueError("no position samples")
+        last = np.append(np.diff(time) > 0.0, True)
+        time, position = time[last], self._true(position[last])
+        felt = k.as_vector(self.felt_at(force_time))
+        grid, index = union(time, felt)
+        force, _ = self._grid(grid, np.interp(grid, time, position))
+        return self._sampled(force_time, force[index])
+
+    def probe(self, time_s: ArrayLike, position_mm: ArrayLike) -> tuple[Array, Array]:
+        """(force at the cell, N; probe position, mm), both (n,), before the force path; else as `simulate`."""
+        time, position = checked(time_s, position_mm)
+        layout = self.layout
+        force, probe = np.empty(time.size), np.empty(time.size)
+        k.run(layout.program, layout.parameters, layout.state.copy(), steps(time), self._true(position), force, probe)
+        return force, probe
+
+    def _true(self, reported: Array) -> Array:
+        """True positions from reported ones."""
+        true = reported.copy()
+        if self.layout.has("report"):
+            k.unreport(self.layout.program, self.layout.parameters, self.layout.state.copy(), true)
+        return true
+
+    def _grid(self, time: Array, position: Array) -> tuple[Array, Array]:
+        """Force after the sensor's dynamics, and the probe, for true positions."""
+        layout = self.layout
+        state = layout.state.copy()
+        dt = steps(time)
+        force, probe = np.empty(time.size), np.empty(time.size)
+        k.run(layout.program, layout.parameters, state, dt, position, force, probe)
+        if layout.has("sensor"):
+            k.run_chain(layout.program, layout.parameters, state, k.SENSOR, dt, force)
+        return force, probe
+
+    def _sampled(self, time: Array, force: Array) -> Array:
+        """What sampling makes of a force at its sample times."""
+        layout = self.layout
+        if layout.has("sampling"):
+            force = k.as_vector(force)
+            k.run_chain(layout.program, layout.parameters, layout.state.copy(), k.SAMPLING, steps(time), force)
+        return force
+
+
+class Plant:
+    """The streaming form: one sample in, one force out. Give the first step dt_s = 0."""
+
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
+        self.program = layout.program
+        self.parameters = layout.parameters
+        self.state = layout.state.copy()
+        self._step = k.plant_step.native
+        self._chain = k.chain.native
+        self._pad = int(layout.program[k.INNER])
+
+    def step(self, dt_s: float, motor_side_mm: float) -> float:
+        """Move to a true pad-frame position within dt_s (linearly); force at the cell in N, before the sensor."""
+        return self._step(self.program, self.parameters, self.state, dt_s, motor_side_mm)
+
+    def sense(self, dt_s: float, force_N: float) -> float:
+        """The force path (lag, resonance, bias …) over one step: force at the cell → force in the path, N."""
+        return self._chain(self.program, self.parameters, self.state, 0, k.SENSOR, dt_s, force_N)
+
+    def sample(self, dt_s: float, force_N: float) -> float:
+        """One sample of the force path: what is reported, dt_s after the last sample (limits, stuck values …)."""
+        return self._chain(self.program, self.parameters, self.state, 0, k.SAMPLING, dt_s, force_N)
+
+    def reported_mm(self, position_mm: float) -> float:
+        """Position as the encoder reports it, for a true one."""
+        return self._chain(self.program, self.parameters, self.state, 0, k.REPORT, 0.0, position_mm)
+
+    @property
+    def probe_mm(self) -> float:
+        """Where the probe is: motor side less play and deflection."""
+        return float(self.state[k.Y])
+
+    @property
+    def force_N(self) -> float:
+        """Force at the cell after the last step."""
+        return float(self.state[k.CELL])
+
+    @property
+    def pad_force_N(self) -> float:
+        """Force between probe and pad after the last step."""
+        return float(self.state[self._pad + k.PAD_FORCE])
+
+    @property
+    def depth_mm(self) -> float:
+        """Depth that the pad's law sees (probe less offsets and set)."""
+        return float(self.state[self._pad + k.PAD_DEPTH])
+
+    @property
+    def elastic_force_N(self) -> float:
+        """F^e after the last step; where the pad has let go, the one that gives no force."""
+        return float(self.state[self._pad + k.FE])
+
+    @property
+    def residual_mm(self) -> float:
+        """What was left of y + Σ frame(F) − x in the last step; 0 without a frame effect."""
+        return float(self.state[k.RESIDUAL])
+
+    def reset(self) -> None:
+        """Back to rest, never touched."""
+        self.state[:] = self._layout.state
+
+    def copy(self) -> Self:
+        """A second plant in the same state."""
+        twin = type(self)(self._layout)
+        twin.state[:] = self.state
+        return twin
+
+
+def checked(time_s: ArrayLike, position_mm: ArrayLike) -> tuple[Array, Array]:
+    """Both as vectors of one length; ValueError where they are not, are not finite, or time falls."""
+    time, position = k.as_vector(time_s), k.as_vector(position_mm)
+    if time.ndim != 1 or time.shape != position.shape:
+        raise ValueError(f"time and position differ in shape: {time.shape} and {position.shape}")
+    check_times(time, "position")
+    if not np.isfinite(position).all():
+        raise ValueError("a position is not a finite number")
+    return time, position
+
+
+def check_times(time: Array, channel: str) -> None:
+    """ValueError where times are not finite or fall."""
+    if not np.isfinite(time).all():
+        raise ValueError(f"a {channel} time is not a finite number")
+    falls = np.flatnonzero(np.diff(time) < 0.0)
+    if falls.size:
+        raise ValueError(f"{channel} time falls at sample {falls[0] + 1}, {time[falls[0] + 1]:g} s")
+
+
+def steps(time: Array) -> Array:
+    """Time from each sample to the next, starting with 0; shape (n,)."""
+    return np.diff(time, prepend=time[:1])
+
+
+def union(first: Array, second: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Both rising grids as one without near duplicates, and where each element of `second` is in it.
+
+    Where stamps of the two fall within a nanosecond the one from `first` stands.
+    """
+    after = np.searchsorted(first, second)
+    low, high = np.maximum(after - 1, 0), np.minimum(after, first.size - 1)
+    near = np.where(np.abs(first[low] - second) <= np.abs(first[high] - second), low, high)
+    same = np.abs(first[near] - second) <= SAME_INSTANT_S
+    snapped = np.where(same, first[near], second)
+    fresh = snapped[~same]
+    if fresh.size:
+        fresh = fresh[np.append(True, np.diff(fresh) > SAME_INSTANT_S)]
+    grid = np.sort(np.concatenate([first, fresh]), kind="stable")
+    index = np.searchsorted(grid, snapped)
+    # a stamp of `second` that was dropped for its close neighbour takes the neighbour's place
+    index = np.minimum(index, grid.size - 1)
+    before = np.maximum(index - 1, 0)
+    closer = np.abs(grid[before] - snapped) < np.abs(grid[index] - snapped)
+    return grid, np.where(closer, before, index)
