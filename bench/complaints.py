@@ -26,7 +26,7 @@ class FieldError(ValueError):
 
 def complaints(error: ValidationError, cls: type[BaseModel], places: Places) -> InputError:
     """All that a validation found as one `InputError`: the first at its place, up to five more below it."""
-    found = [_complaint(details, cls, places) for details in error.errors(include_url=False)]
+    found = [_complaint(details, cls, places) for details in _without_echoes(error.errors(include_url=False))]
     # In the file's order, so that the first is the one a reader meets first.
     found.sort(key=lambda c: c[0] or (0, 0))
     _, place, message, cure = found[0]
@@ -37,6 +37,20 @@ def complaints(error: ValidationError, cls: type[BaseModel], places: Places) -> 
     return InputError(place, message, "\n  ".join(lines))
 
 
+def _without_echoes(errors: list[Any]) -> list[Any]:
+    """A misspelt key is unknown, and the right one missing: that is one mistake, told once."""
+    unknown: dict[tuple[Key, ...], list[str]] = {}
+    for details in errors:
+        if details["type"] == "extra_forbidden":
+            unknown.setdefault(details["loc"][:-1], []).append(str(details["loc"][-1]))
+    return [
+        details
+        for details in errors
+        if details["type"] != "missing"
+        or not difflib.get_close_matches(str(details["loc"][-1]), unknown.get(details["loc"][:-1], []), 1, 0.5)
+    ]
+
+
 def _complaint(details: Any, cls: type[BaseModel], places: Places) -> tuple[tuple[int, int] | None, str, str, str]:
     loc: tuple[Key, ...] = details["loc"]
     raised = details.get("ctx", {}).get("error")
@@ -44,7 +58,7 @@ def _complaint(details: Any, cls: type[BaseModel], places: Places) -> tuple[tupl
     if isinstance(raised, FieldError):
         path, message, cure = (*_trimmed(loc, places), *raised.path), raised.message, raised.cure
     else:
-        path = places.known_part(loc)
+        path = places.known_part(loc) if details["type"] == "missing" else _trimmed(loc, places)
         message = _wording(details)
     unknown = details["type"] == "extra_forbidden"
     if unknown:
@@ -140,6 +154,8 @@ def _step(annotation: Any, key: Key) -> Iterator[Any]:
         bare, tag = member
         if isinstance(key, int) and get_origin(bare) in (list, tuple):
             yield get_args(bare)[0]
+        elif get_origin(bare) is dict:
+            yield get_args(bare)[1]
         elif isinstance(key, str) and (tag == key or getattr(bare, "__name__", None) == key):
             yield bare
         elif isinstance(bare, type) and issubclass(bare, BaseModel):

@@ -222,9 +222,9 @@ def _with_map(bench: Bench, key: Literal["motor", "load_cell"], document: Docume
 
 def load_model(name_or_path: str | Path) -> Model:
     """A pad model by file or shipped name; raises `InputError`."""
-    from bench.modelfile import read_model  # the physics take a moment to import; `schema` does without
+    from sim.model import Model  # the physics take a moment to import; whoever needs no pad does without
 
-    return read_model(find_file("pad", name_or_path))
+    return validate(read_yaml(find_file("pad", name_or_path)), Model)
 
 
 def simulated(bench: Bench) -> Bench:

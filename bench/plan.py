@@ -61,7 +61,7 @@ class Segment:
     `kind`: ramp (to `target_mm`), hold (position, `duration_s`), force_ramp (until `target_N`), force_hold (keep
     `target_N` for `duration_s`), air (a hold away from the pad). What does not apply is NaN. `start_mm` is NaN after
     a force target. `asked_mm_s` is the protocol's speed, `speed_mm_s` what is commanded: less on the way to a force
-    where the force channel's latency forbids more.
+    where the force channel's latency forbids more. `path` is the step in the protocol file.
     """
 
     name: str
@@ -161,7 +161,7 @@ class _Planner:
             jerk = self.acceleration / RISE_TO_ACCELERATION_S
             self.jerk = protocol.jerk or min(jerk, bench.limits.jerk or jerk)
         self.problems: list[Problem] = []
-        self.short: dict[tuple[float, float, float], list[str]] = {}
+        self.short: dict[float, list[tuple[str, float]]] = {}
         self.seen: set[tuple[tuple[Key, ...], str]] = set()
         approach = protocol.approach
         self.start_mm = -approach.retract if isinstance(approach, Approach) else 0.0
@@ -192,27 +192,26 @@ class _Planner:
         if before is not None:
             for k in range(before.cycles):
                 name = f"precondition[{k}]"
-                yield self._ramp(name, "precondition", ("precondition", "speed"), before.to, before.speed)
-                yield self._ramp(name, "precondition", ("precondition", "speed"), self.start_mm, before.speed)
+                yield self._ramp(name, "precondition", ("precondition",), before.to, before.speed)
+                yield self._ramp(name, "precondition", ("precondition",), self.start_mm, before.speed)
             if before.rest:
-                path: tuple[Key, ...] = ("precondition", "rest")
-                yield self._still("precondition", "precondition", "hold", path, before.rest, self.at_mm)
+                yield self._still("precondition", "precondition", "hold", ("precondition",), before.rest, self.at_mm)
         for flat in self.protocol.flatten():
             yield from self._step(flat, flat.step)
         out = -finish.retract if not self.protocol.in_air else self.start_mm
         # The default speed of leaving is ours, not asked for: it bows to the bench's limit.
         speed = finish.speed if "speed" in finish.model_fields_set else min(finish.speed, self.limits.speed_mm_s)
-        yield self._ramp("finish", "finish", ("finish", "speed"), out, speed)
+        yield self._ramp("finish", "finish", ("finish",), out, speed)
         yield self._still("finish", "finish", "air", ("finish",), finish.air, out)
 
     def _step(self, flat: FlatStep, step: DepthStep | ForceStep) -> Iterator[Segment]:
         if isinstance(step, DepthStep):
-            yield self._ramp(flat.name, "steps", (*flat.path, "speed"), step.to, step.speed)
+            yield self._ramp(flat.name, "steps", flat.path, step.to, step.speed)
             if step.hold:
                 yield self._still(flat.name, "steps", "hold", flat.path, step.hold, step.to)
             return
         speed = self._force_speed(flat, step)
-        ramp = self._ramp(flat.name, "steps", (*flat.path, "speed"), NAN, step.speed)
+        ramp = self._ramp(flat.name, "steps", flat.path, NAN, step.speed)
         yield replace(ramp, kind="force_ramp", target_N=step.to_force, speed_mm_s=speed)
         if step.hold and step.hold_mode == "force":
             hold = self._still(flat.name, "steps", "force_hold", flat.path, step.hold, NAN)
@@ -222,12 +221,12 @@ class _Planner:
 
     def _ramp(self, name: str, phase: Phase, path: tuple[Key, ...], to: float, speed: float) -> Segment:
         start, self.at_mm = self.at_mm, to
-        self._check_speed(name, path, speed)
+        self._check_speed(name, (*path, "speed"), speed)
         segment = Segment(name, phase, "ramp", path, start, to, NAN, speed, speed, self.acceleration, self.jerk)
         if not math.isnan(start) and not math.isnan(to) and start != to:
             reached = segment.profile().peak_speed_mm_s
             if reached < speed * (1 - 1e-9):
-                self.short.setdefault((speed, reached, abs(to - start)), []).append(name)
+                self.short.setdefault(speed, []).append((name, reached))
         return segment
 
     @staticmethod
@@ -292,12 +291,13 @@ class _Planner:
         return f"motor.max_{what}" if most is not None and most < limit else f"the bench's limits.{what}"
 
     def _tell_short_ramps(self) -> None:
-        for (speed, reached, way), names in self.short.items():
+        for speed, ramps in self.short.items():
+            least, most = min(reached for _, reached in ramps), max(reached for _, reached in ramps)
+            reached = f"{least:.3g}" if most - least < 0.05 else f"{least:.3g} to {most:.3g}"
             message = (
-                f"reaches {reached:.3g} of {speed:g} mm/s: {way:.3g} mm are too short for more at "
-                f"{self.acceleration:g} mm/s²"
+                f"reaches {reached} of {speed:g} mm/s: the way is too short for more at {self.acceleration:g} mm/s²"
             )
-            self.problems.append(Problem(_listed(names), message, "notice"))
+            self.problems.append(Problem(_listed([name for name, _ in ramps]), message, "notice"))
 
     def _once(
         self,
@@ -333,7 +333,7 @@ def stiffness_at(believed: Model | None, force_N: float) -> float | None:
     """
     if believed is None:
         return None
-    law, relaxation = believed.pad.elastic, believed.pad.relaxation
+    law, relaxation = believed.pad.law, believed.pad.relaxation
     longest = max(1.0 - float(sum(relaxation.shares)), 0.2)
     depth = float(law.depth_at(force_N / longest))
     stiffness = float(law.stiffness(depth)) if math.isfinite(depth) and depth > 0 else 0.0

@@ -246,18 +246,18 @@ def _leaves(steps: list[Step], path: tuple[Key, ...]) -> Iterator[tuple[tuple[Ke
 
 
 def _check_count(steps: list[Step], path: tuple[Key, ...], times: int) -> int:
-    """How many steps these expand to; refuses the first block with which they are too many."""
+    """How many steps these expand to; refuses the first place with which they are too many."""
     total = 0
     for i, step in enumerate(steps):
+        here = (*path, i)
         if isinstance(step, BlockStep):
-            total += _check_count(step.steps, (*path, i, "steps"), times * step.repeat) * step.repeat
-            culprit: tuple[Key, ...] = (*path, i, "repeat")
+            inside = times * step.repeat
+            total += step.repeat * (_check_count(step.steps, (*here, "steps"), inside) if inside <= MAX_STEPS else inside)
+            here = (*here, "repeat")
         else:
             total += 1
-            culprit = (*path, i)
         if total * times > MAX_STEPS:
-            message = f"with this {spell(path)} holds more than {MAX_STEPS} steps"
-            raise FieldError(culprit, message, "repeat fewer times")
+            raise FieldError(here, f"the steps are more than {MAX_STEPS} with this", "repeat fewer times")
     return total
 
 

@@ -7,7 +7,7 @@ belong to it (line noise before a frame) are skipped; a frame of another device 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, Literal, TypeVar
 
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU, ModbusPDU
@@ -88,7 +88,11 @@ class ModbusClient:
         return self.sample_registers(table, address, count, lambda registers, _time, _received: registers)
 
     def sample_registers(
-        self, table: Literal["holding", "input"], address: int, count: int, convert: Callable[[list[int], float, float], T]
+        self,
+        table: Literal["holding", "input"],
+        address: int,
+        count: int,
+        convert: Callable[[list[int], float, float], T],
     ) -> Exchange[T]:
         """Registers turned into a value; `convert(registers, time_s, received_s)` gets the time they were read at."""
 
@@ -216,9 +220,7 @@ class ModbusClient:
 
         return length
 
-    def _resynchronise(
-        self, buffer: bytearray, head: bytes, refusal: bytes, length: Callable[[bytearray], int]
-    ) -> int:
+    def _resynchronise(self, buffer: bytearray, head: bytes, refusal: bytes, length: Callable[[bytearray], int]) -> int:
         """Skip bytes before the reply, unless they are a whole frame of something else."""
         starts = [index for index in (buffer.find(head, 1), buffer.find(refusal, 1)) if index > 0]
         if starts:
@@ -293,10 +295,8 @@ class ModbusClient:
         reply = self._decoder.decode(pdu)
         if reply is None:
             raise UnexpectedReply(self.link.name, f"the reply to '{name}' cannot be decoded")
-        return cast(ModbusPDU, reply)
+        return reply
 
     def _refused(self, name: str, code: int) -> None:
         meaning = EXCEPTIONS.get(code, "a code that Modbus does not define")
-        raise ExceptionReply(
-            self.link.name, f"the device refuses '{name}': exception {code}, {meaning}", code=code
-        )
+        raise ExceptionReply(self.link.name, f"the device refuses '{name}': exception {code}, {meaning}", code=code)

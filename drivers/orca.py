@@ -20,6 +20,7 @@ from drivers.orca_frames import (
     APPLY_GAINS,
     AUTO_ZERO_DONE,
     AUTO_ZERO_FAILED,
+    COMMS_TIMEOUT_ERROR,
     STATORS,
     STREAM,
     STREAM_REPLY_SIZE,
@@ -68,7 +69,13 @@ class Orca:
     kind: Literal["stream", "move"] = "stream"
 
     def __init__(
-        self, link: Link, *, name: str = "motor", address: int = 1, direction: int = 1, gains: dict[str, float] | None = None
+        self,
+        link: Link,
+        *,
+        name: str = "motor",
+        address: int = 1,
+        direction: int = 1,
+        gains: dict[str, float] | None = None,
     ) -> None:
         self.name = name
         self.link = link
@@ -146,7 +153,7 @@ class Orca:
         return bool(status & AUTO_ZERO_DONE)
 
     def home(self) -> Steps[None]:
-        """Auto zero against the hard stop, with the force and speed set in the motor; ends asleep or as it is set up."""
+        """Auto zero against the hard stop, with the force and speed set in the motor."""
         zero_mode = (yield self._modbus.read_holding(Register.ZERO_MODE))[0]
         if zero_mode not in (2, 3):
             raise DriverError(
@@ -160,7 +167,8 @@ class Orca:
         while True:
             yield Pause(0.05)
             mode = (yield self._modbus.read_holding(Register.MODE_NOW))[0]
-            errors = (yield self._modbus.read_holding(Register.ERRORS))[0]
+            # Nothing streams meanwhile, so the watchdog may complain; energising clears that.
+            errors = (yield self._modbus.read_holding(Register.ERRORS))[0] & ~COMMS_TIMEOUT_ERROR
             if errors & AUTO_ZERO_FAILED:
                 raise self._fault(errors, "did not find its zero")
             if mode != Mode.AUTO_ZERO:
@@ -260,6 +268,10 @@ class Orca:
         frame = command_frame(self.address, Command.POSITION, round(position_mm * self._um_per_mm))
         return Exchange("stream", frame, self._length, self._parse_stream, self._timeout_s)
 
+    def move(self, target_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> Steps[None]:
+        """Not with this motor: it follows a stream of positions; raises `DriverError`."""
+        raise DriverError(self.name, "an Orca follows a stream of positions; it is sent no moves")
+
     def _parse_stream(self, frame: bytes, sent_s: float, received_s: float) -> MotorSample:
         self._modbus.check_rtu("stream", frame)
         position_um, force_mN, _power, _temperature, _voltage, errors = command_reply(frame)
@@ -282,7 +294,9 @@ def _checked_gains(name: str, gains: dict[str, float] | None) -> list[int] | Non
     if gains is None:
         return None
     if set(gains) != set(GAINS):
-        raise DriverError(name, f"gains of an Orca are {', '.join(GAINS)}, all of them; got {', '.join(gains) or 'none'}")
+        raise DriverError(
+            name, f"gains of an Orca are {', '.join(GAINS)}, all of them; got {', '.join(gains) or 'none'}"
+        )
     words = [round(gains[key]) for key in GAINS]
     if any(not 0 <= word <= 0xFFFF for word in words):
         raise DriverError(name, "gains of an Orca are raw register values from 0 to 65535")

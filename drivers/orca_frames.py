@@ -65,8 +65,9 @@ AUTO_ZERO_DONE = 1 << 0
 AUTO_ZERO_RUNNING = 1 << 1
 """Bits of the motor status, register 321."""
 
+COMMS_TIMEOUT_ERROR = 1 << 11
 AUTO_ZERO_FAILED = 1 << 13
-"""Error bit."""
+"""Error bits that homing looks at."""
 
 ZERO_MODES = {0: "negative", 1: "manual", 2: "auto zero", 3: "auto zero on boot", 4: "IOSH auto zero"}
 
@@ -107,4 +108,4 @@ def command_frame(address: int, command: int, value: int) -> bytes:
 
 def command_reply(frame: bytes) -> tuple[int, int, int, int, int, int]:
     """Stream reply: position µm, force mN, power W, temperature °C, supply mV, error word."""
-    return _REPLY.unpack(frame)  # type: ignore[return-value]  # six numbers by the format
+    return _REPLY.unpack(frame)

@@ -276,8 +276,12 @@ class MotorMap(_DeviceMap):
     @model_validator(mode="after")
     def _complete(self) -> MotorMap:
         self._must_know(["position"], self.values, "values")
-        if self.block_of(self.values["position"]) is None:
+        block = self.block_of(self.values["position"])
+        if block is None:
             raise ValueError("value 'position' lies in no block")
+        for name in ("force", "fault"):
+            if name in self.values and self.block_of(self.values[name]) != block:
+                raise ValueError(f"value {name!r} must lie in the block of 'position', to be of the same moment")
         self._must_know(["servo_on"], self.bits, "bits")
         self._must_know(self.faults, self.bits, "faults")
         self._must_know(list(self.clamps.values()), self.values, "clamps")

@@ -7,7 +7,7 @@ Three kinds of function are compiled:
 - `@compiled("float64(float64, int64)")`: a plain function, called from Python or from other compiled functions;
 - `@block`: one scalar step `(dt_s, u, state, parameters) -> float`, called by address (`call_block`), so that any
   combination of blocks runs in one generic loop that was compiled once;
-- `call_block`: the call of a block by its address, for compiled functions only.
+- `call_block`: the call of a block by its address, and `pointer`, for compiled functions only.
 
 A module-level function may call any of these by their global name. Left alone, each is an ordinary Python function
 over ordinary sequences (`block.python`, `compiled.python`), which is how they are tested against themselves.
@@ -18,10 +18,12 @@ function of another file goes unnoticed. So the folder is named after a hash of 
 
 from __future__ import annotations
 
+import atexit
 import functools
 import hashlib
 import os
 import shutil
+import stat
 import sys
 import tempfile
 import time
@@ -69,8 +71,8 @@ def _roots() -> Iterator[Path]:
 def cache_folder() -> Path:
     """The folder of this version's compiled code: made, writable, and the only one numba is shown.
 
-    Without a writable cache folder it is a new private one under the system's temporary folder: compiled code is
-    loaded and run, so a folder that others can write to will not do.
+    Without a writable cache folder it is a private one under the system's temporary folder: compiled code is loaded
+    and run, so a folder that others can write to will not do.
     """
     name = sources_hash(Path(__file__).parent)
     for root in _roots():
@@ -82,7 +84,24 @@ def cache_folder() -> Path:
             continue
         _prune(root, keep=folder)
         return folder
-    return Path(tempfile.mkdtemp(prefix="padbench-"))
+    folder = _private_temporary() / name
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def _private_temporary() -> Path:
+    """A folder of this user alone; where somebody else made it, a new one that goes with the process."""
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"padbench-{user}"
+    with suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        info = folder.lstat()
+        ours = info.st_uid == user and not info.st_mode & 0o077
+        if stat.S_ISDIR(info.st_mode) and (ours or not hasattr(os, "getuid")) and os.access(folder, os.W_OK):
+            return folder
+    fresh = Path(tempfile.mkdtemp(prefix="padbench-"))
+    atexit.register(shutil.rmtree, fresh, ignore_errors=True)
+    return fresh
 
 
 def _prune(root: Path, keep: Path) -> None:
@@ -101,12 +120,13 @@ def _numba_cache() -> Iterator[Any]:
     """Numba, with its cache in our folder while it looks (other users of numba in this process keep theirs)."""
     import numba
 
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_folder())
+    config: Any = numba.config
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_folder())
     try:
         yield numba
     finally:
-        numba.config.CACHE_DIR = before
+        config.CACHE_DIR = before
 
 
 def _names(code: types.CodeType) -> set[str]:
@@ -156,9 +176,11 @@ class Compiled(_Deferred, Generic[P, R]):
         return result
 
     def numba_object(self) -> Any:
+        """What a compiled caller calls."""
         return self.native
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Run the compiled function."""
         return self.native(*args, **kwargs)
 
 
@@ -186,15 +208,20 @@ class Block(_Deferred):
             double = numba.types.float64
             return numba.cfunc(double(double, double, pointer, pointer), cache=True, error_model="numpy")(bound)
 
+    def __reduce__(self) -> str:
+        return self.python.__qualname__  # pickled and copied by name, as functions are
+
     @property
     def address(self) -> int:
         """Address of the compiled step; good for the life of the process."""
         return int(self._native.address)
 
     def numba_object(self) -> Any:
+        """Raises TypeError: a call by name would need a compilation for each combination of blocks."""
         raise TypeError(f"{self.python.__name__} is a block; compiled code calls it by address")
 
     def __call__(self, dt_s: float, u: float, state: State, parameters: State) -> float:
+        """Run the Python form."""
         return self.python(dt_s, u, state, parameters)
 
 
@@ -203,41 +230,69 @@ def block(function: Step) -> Block:
     return Block(function)
 
 
-class _CallBlock(_Deferred):
-    """`call_block(address, dt, u, state, i, parameters, j)`: the block at `address` on `state[i:]`, `parameters[j:]`."""
+class _Intrinsic(_Deferred):
+    """A primitive of compiled code that numba does not have; made from `typed` when it is first needed."""
+
+    def __init__(self, name: str, typed: Callable[[], Any]) -> None:
+        self.name = name
+        self._typed = typed
 
     @functools.cached_property
-    def _intrinsic(self) -> Any:
-        from llvmlite import ir
-        from numba import types as nt
+    def _object(self) -> Any:
         from numba.extending import intrinsic
 
-        def typed(typing: Any, address: Any, dt: Any, u: Any, state: Any, i: Any, parameters: Any, j: Any) -> Any:
-            vector = nt.Array(nt.float64, 1, "C")
-            signature = nt.float64(nt.int64, nt.float64, nt.float64, vector, nt.int64, vector, nt.int64)
-
-            def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-                place, dt, u, state, i, parameters, j = arguments
-                double = ir.DoubleType()
-                pointer = double.as_pointer()
-
-                def at(array: Any, index: Any) -> Any:
-                    data = context.make_array(vector)(context, builder, array).data
-                    return builder.gep(builder.bitcast(data, pointer), [index])
-
-                step = ir.FunctionType(double, [double, double, pointer, pointer])
-                function = builder.inttoptr(place, step.as_pointer())
-                return builder.call(function, [dt, u, at(state, i), at(parameters, j)])
-
-            return signature, generate
-
-        return intrinsic(typed)
+        return intrinsic(self._typed())
 
     def numba_object(self) -> Any:
-        return self._intrinsic
+        return self._object
 
-    def __call__(self, address: int, dt: float, u: float, state: Any, i: int, parameters: Any, j: int) -> float:
-        raise TypeError("call_block works in compiled code only")
+    def __call__(self, *arguments: Any) -> Any:
+        raise TypeError(f"{self.name} works in compiled code only")
 
 
-call_block = _CallBlock()
+def _numba_types() -> Any:
+    import numba
+
+    return numba.types
+
+
+def _call_block() -> Any:
+    from llvmlite import ir
+
+    nt = _numba_types()
+    doubles = nt.CPointer(nt.float64)
+
+    def typed(typing: Any, address: Any, dt: Any, u: Any, state: Any, i: Any, parameters: Any, j: Any) -> Any:
+        signature = nt.float64(nt.int64, nt.float64, nt.float64, doubles, nt.int64, doubles, nt.int64)
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            place, dt, u, state, i, parameters, j = arguments
+            double = ir.DoubleType()
+            step = ir.FunctionType(double, [double, double, double.as_pointer(), double.as_pointer()])
+            function = builder.inttoptr(place, step.as_pointer())
+            return builder.call(function, [dt, u, builder.gep(state, [i]), builder.gep(parameters, [j])])
+
+        return signature, generate
+
+    return typed
+
+
+def _pointer() -> Any:
+    nt = _numba_types()
+
+    def typed(typing: Any, array: Any) -> Any:
+        signature = nt.CPointer(array.dtype)(array)
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return context.make_array(array)(context, builder, arguments[0]).data
+
+        return signature, generate
+
+    return typed
+
+
+call_block = _Intrinsic("call_block", _call_block)
+"""`call_block(address, dt, u, state, i, parameters, j)`: the block at `address` on `state[i:]` and `parameters[j:]`."""
+
+pointer = _Intrinsic("pointer", _pointer)
+"""`pointer(array)`: to its first element. An array is a counted reference, which costs at every call it is passed to."""

@@ -19,10 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.jit import call_block, compiled
+from sim.jit import call_block, compiled, pointer
 
 Array = NDArray[np.float64]
 Program = NDArray[np.int64]
+Ints = Program  # inside the loop these are bare pointers
+Doubles = Array
 
 PLACES = (
     "report",
@@ -61,8 +63,8 @@ def ramp_gain(x: float) -> float:
     return -math.expm1(-x) / x
 
 
-@compiled("float64(int64[::1], float64[::1], float64[::1], int64, int64, float64, float64)")
-def chain(program: Program, params: Array, state: Array, shift: int, place: int, dt: float, u: float) -> float:
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, int64, float64, float64)")
+def chain(program: Ints, params: Doubles, state: Doubles, shift: int, place: int, dt: float, u: float) -> float:
     """The blocks of a place one after the other; state offsets moved by `shift` (a trial copy)."""
     for k in range(program[STARTS + place], program[STARTS + place + 1]):
         row = ROWS + 3 * k
@@ -70,8 +72,8 @@ def chain(program: Program, params: Array, state: Array, shift: int, place: int,
     return u
 
 
-@compiled("float64(int64[::1], float64[::1], float64[::1], int64, int64, float64, float64)")
-def total(program: Program, params: Array, state: Array, shift: int, place: int, dt: float, u: float) -> float:
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, int64, float64, float64)")
+def total(program: Ints, params: Doubles, state: Doubles, shift: int, place: int, dt: float, u: float) -> float:
     """Sum of the blocks of a place."""
     result = 0.0
     for k in range(program[STARTS + place], program[STARTS + place + 1]):
@@ -80,8 +82,8 @@ def total(program: Program, params: Array, state: Array, shift: int, place: int,
     return result
 
 
-@compiled("float64(int64[::1], float64[::1], float64[::1], int64, int64, float64, float64)")
-def product(program: Program, params: Array, state: Array, shift: int, place: int, dt: float, u: float) -> float:
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, int64, float64, float64)")
+def product(program: Ints, params: Doubles, state: Doubles, shift: int, place: int, dt: float, u: float) -> float:
     """Product of the blocks of a place."""
     result = 1.0
     for k in range(program[STARTS + place], program[STARTS + place + 1]):
@@ -90,9 +92,11 @@ def product(program: Program, params: Array, state: Array, shift: int, place: in
     return result
 
 
-@compiled("float64(int64[::1], float64[::1], float64[::1], int64, float64, float64, float64, float64, float64)")
+@compiled(
+    "float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64, float64)"
+)
 def surface_force(
-    program: Program, params: Array, state: Array, shift: int, dt: float, s: float, A: float, B: float, factor: float
+    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, s: float, A: float, B: float, factor: float
 ) -> float:
     """Force of the pad were its surface at depth `s`: A + B F^e(s) + contact(s), contact blocks on a scratch copy."""
     inner, scratch = program[INNER], program[SCRATCH]
@@ -103,11 +107,14 @@ def surface_force(
     return A + B * Fe + total(program, params, state, aside, CONTACT, dt, s)
 
 
-@compiled("float64(int64[::1], float64[::1], float64[::1], int64, float64, float64, float64, float64, float64)")
+@compiled(
+    "float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64, float64)"
+)
 def free_surface(
-    program: Program, params: Array, state: Array, shift: int, dt: float, low: float, A: float, B: float, factor: float
+    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, low: float, A: float, B: float, factor: float
 ) -> float:
-    """Depth at which a pad that has let go carries no force; `low` is a depth where the force would be negative."""
+    """Depth at which a pad that has let go carries no force; at depth `low` the force would be negative."""
+    low = max(low, 0.0)  # nothing of the pad's changes above its surface
     f_low = surface_force(program, params, state, shift, dt, low, A, B, factor)
     high = max(low, state[program[INNER] + shift + SURFACE])
     width = max(high - low, 1e-6)
@@ -143,8 +150,8 @@ def free_surface(
     return high
 
 
-@compiled("float64(int64[::1], float64[::1], float64[::1], int64, float64, float64)")
-def pad_step(program: Program, params: Array, state: Array, shift: int, dt: float, y: float) -> float:
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64)")
+def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, y: float) -> float:
     """One step of everything between probe position and load cell, on the state moved by `shift`. F_cell in N."""
     r = program[MODES]
     pad = program[INNER] + shift
@@ -179,7 +186,7 @@ def pad_step(program: Program, params: Array, state: Array, shift: int, dt: floa
             F = 0.0
     else:
         if surface_force(program, params, state, shift, dt, depth, A, B, factor) < 0.0:
-            surface = max(0.0, free_surface(program, params, state, shift, dt, depth, A, B, factor))
+            surface = free_surface(program, params, state, shift, dt, depth, A, B, factor)
             if plain:
                 Fe = -A / B if B > 0.0 else 0.0
             else:
@@ -200,8 +207,8 @@ def pad_step(program: Program, params: Array, state: Array, shift: int, dt: floa
     return F + total(program, params, state, shift, PROBE, dt, y)
 
 
-@compiled("float64(int64[::1], float64[::1], float64[::1], float64, float64, float64)")
-def imbalance(program: Program, params: Array, state: Array, dt: float, x: float, y: float) -> float:
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), float64, float64, float64)")
+def imbalance(program: Ints, params: Doubles, state: Doubles, dt: float, x: float, y: float) -> float:
     """y + Σ frame(F_cell(y)) − x, on a fresh trial copy of the state."""
     inner, trial = program[INNER], program[TRIAL]
     for k in range(program[INNER_SIZE]):
@@ -212,8 +219,8 @@ def imbalance(program: Program, params: Array, state: Array, dt: float, x: float
     return y + total(program, params, state, shift, FRAME, dt, F) - x
 
 
-@compiled("float64(int64[::1], float64[::1], float64[::1], float64, float64)")
-def solve(program: Program, params: Array, state: Array, dt: float, x: float) -> float:
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), float64, float64)")
+def solve(program: Ints, params: Doubles, state: Doubles, dt: float, x: float) -> float:
     """Probe position y with y + Σ frame(F_cell(y)) = x; the state becomes the one at y.
 
     Secant steps kept within a bracket once there is one. A passive frame and pad have a slope of at least 1, so that a
@@ -268,8 +275,8 @@ def solve(program: Program, params: Array, state: Array, dt: float, x: float) ->
     return b
 
 
-@compiled("float64(int64[::1], float64[::1], float64[::1], float64, float64)")
-def plant_step(program: Program, params: Array, state: Array, dt: float, x: float) -> float:
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), float64, float64)")
+def plant_step(program: Ints, params: Doubles, state: Doubles, dt: float, x: float) -> float:
     """One step of the plant: motor-side position `x` in mm, `dt` seconds after the last; force at the cell in N."""
     x = chain(program, params, state, 0, PLAY, dt, x)
     if program[STARTS + FRAME] == program[STARTS + FRAME + 1]:
@@ -285,37 +292,52 @@ def plant_step(program: Program, params: Array, state: Array, dt: float, x: floa
 @compiled("void(int64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
 def run(program: Program, params: Array, state: Array, dt: Array, x: Array, force: Array, probe: Array) -> None:
     """`plant_step` over arrays of shape (n,): force at the cell and probe position are written to the last two."""
+    program_p, params_p, state_p = pointer(program), pointer(params), pointer(state)
     for n in range(x.size):
-        force[n] = plant_step(program, params, state, dt[n], x[n])
+        force[n] = plant_step(program_p, params_p, state_p, dt[n], x[n])
         probe[n] = state[Y]
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], float64, float64)")
+def step(program: Program, params: Array, state: Array, dt: float, x: float) -> float:
+    """`plant_step` for Python."""
+    return plant_step(pointer(program), pointer(params), pointer(state), dt, x)
+
+
+@compiled("float64(int64[::1], float64[::1], float64[::1], int64, float64, float64)")
+def chain_step(program: Program, params: Array, state: Array, place: int, dt: float, u: float) -> float:
+    """`chain` for Python."""
+    return chain(pointer(program), pointer(params), pointer(state), 0, place, dt, u)
 
 
 @compiled("void(int64[::1], float64[::1], float64[::1], int64, float64[::1], float64[::1])")
 def run_chain(program: Program, params: Array, state: Array, place: int, dt: Array, u: Array) -> None:
     """The blocks of a place over an array, in place."""
+    program_p, params_p, state_p = pointer(program), pointer(params), pointer(state)
     for n in range(u.size):
-        u[n] = chain(program, params, state, 0, place, dt[n], u[n])
+        u[n] = chain(program_p, params_p, state_p, 0, place, dt[n], u[n])
 
 
 @compiled("void(int64[::1], float64[::1], float64[::1], float64[::1])")
 def unreport(program: Program, params: Array, state: Array, u: Array) -> None:
     """True positions from reported ones, in place. `report` blocks are static and of slope near 1."""
+    program_p, params_p, state_p = pointer(program), pointer(params), pointer(state)
     for n in range(u.size):
         y = u[n]
         for _ in range(60):
-            error = chain(program, params, state, 0, REPORT, 0.0, y) - u[n]
+            error = chain(program_p, params_p, state_p, 0, REPORT, 0.0, y) - u[n]
             y -= error
             if abs(error) <= 1e-15 * max(abs(y), 0.1):
                 break
         u[n] = y
 
 
-@compiled("void(int64, float64[::1], float64[::1], float64[::1])")
-def apply(address: int, params: Array, u: Array, out: Array) -> None:
-    """One block without memory over an array."""
-    state = np.zeros(1)
+@compiled("void(int64, float64[::1], float64[::1], float64[::1], float64[::1])")
+def apply(address: int, params: Array, state: Array, u: Array, out: Array) -> None:
+    """One block at dt = 0 over an array."""
+    params_p, state_p = pointer(params), pointer(state)
     for n in range(u.size):
-        out[n] = call_block(address, 0.0, u[n], state, 0, params, 0)
+        out[n] = call_block(address, 0.0, u[n], state_p, 0, params_p, 0)
 
 
 def as_vector(values: Any) -> Array:

@@ -14,21 +14,24 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    FiniteFloat,
-    NonNegativeFloat,
-    SerializerFunctionWrapHandler,
+    GetJsonSchemaHandler,
     field_validator,
     model_serializer,
     model_validator,
 )
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
-from sim.effects import Active, Form, all_effects
+from sim.effects import Active, Effect, Form, all_effects
 from sim.elastic import ElasticLaw, Exponential, NoPad, Polynomial, Power, Spline
 from sim.pad import Cascade, Pad, Plant
 from sim.relaxation import Relaxation
 
 Array = NDArray[np.float64]
-Positive = Annotated[FiniteFloat, Field(gt=0)]
+# strict: a text or `true` in a file is a slip, not a number
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
 
 SHARES_ROUNDING = 1e-9
 
@@ -43,7 +46,23 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 class _Part(BaseModel):
+    """Part of a model file: immutable, so that what was computed from it is kept, but not copied with it."""
+
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def _forget(self) -> Self:
+        for name in set(self.__dict__) - set(type(self).model_fields):
+            del self.__dict__[name]
+        return self
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy, with `update` put in unchecked."""
+        return super().model_copy(update=update, deep=deep)._forget()
+
+    def __getstate__(self) -> dict[Any, Any]:
+        state = super().__getstate__()
+        fields = type(self).model_fields
+        return {**state, "__dict__": {name: value for name, value in state["__dict__"].items() if name in fields}}
 
 
 class ExponentialSpec(_Part):
@@ -51,7 +70,7 @@ class ExponentialSpec(_Part):
 
     law: Literal["exponential"]
     m: Positive = Field(description="N/mm")
-    b: FiniteFloat = Field(description="1/mm")
+    b: Number = Field(description="1/mm")
 
     def elastic(self) -> ElasticLaw:
         """The law itself."""
@@ -63,7 +82,7 @@ class PowerSpec(_Part):
 
     law: Literal["power"]
     p: Positive = Field(description="N/mm^(q+1)")
-    q: Annotated[FiniteFloat, Field(gt=-1)] = Field(description="exponent of the stiffness")
+    q: Annotated[Number, Field(gt=-1)] = Field(description="exponent of the stiffness")
 
     def elastic(self) -> ElasticLaw:
         """The law itself."""
@@ -74,7 +93,7 @@ class PolynomialSpec(_Part):
     """F^e = Σ α_i δ^i, (14)."""
 
     law: Literal["polynomial"]
-    alpha: Annotated[list[FiniteFloat], Field(min_length=2)] = Field(description="α_0, α_1 … in N/mm^i")
+    alpha: Annotated[list[Number], Field(min_length=2)] = Field(description="α_0, α_1 … in N/mm^i")
 
     def elastic(self) -> ElasticLaw:
         """The law itself."""
@@ -85,8 +104,8 @@ class SplineSpec(_Part):
     """F^e through points."""
 
     law: Literal["spline"]
-    delta_mm: Annotated[list[FiniteFloat], Field(min_length=1)]
-    force_N: Annotated[list[FiniteFloat], Field(min_length=1)]
+    delta_mm: Annotated[list[Number], Field(min_length=1)]
+    force_N: Annotated[list[Number], Field(min_length=1)]
 
     @model_validator(mode="after")
     def _rises(self) -> Self:
@@ -116,7 +135,7 @@ ElasticSpec = Annotated[
 class RelaxationSpec(_Part):
     """c_1 … c_r and ν_1 … ν_r of (6); c_0 is what is left of 1."""
 
-    shares: list[NonNegativeFloat] = Field(default_factory=list, description="c_1, c_2 …")
+    shares: list[NotNegative] = Field(default_factory=list, description="c_1, c_2 …")
     rates: list[Positive] = Field(default_factory=list, description="ν_1, ν_2 … in 1/s, descending")
 
     @field_validator("shares")
@@ -146,7 +165,7 @@ class PadSpec(_Part):
     elastic: ElasticSpec
     relaxation: RelaxationSpec = Field(default_factory=RelaxationSpec)
     contact: Literal["unilateral", "bonded"] = "unilateral"
-    std: dict[str, NonNegativeFloat] | None = None
+    std: dict[str, NotNegative] | None = None
 
     @model_validator(mode="after")
     def _std_of_something(self) -> Self:
@@ -185,15 +204,34 @@ class PadSpec(_Part):
 class Quantity(_Part):
     """A number, its unit, and its standard deviation where known."""
 
-    value: FiniteFloat
+    value: Number
     unit: str | None = None
-    std: NonNegativeFloat | None = None
+    std: NotNegative | None = None
 
 
-class EffectEntry(BaseModel):
+def _form_schema(effect: Effect, form: Form) -> dict[str, Any]:
+    """JSON schema of one form of an effect as it stands in a file."""
+    properties: dict[str, Any] = {"id": {"const": effect.id, "description": effect.what}}
+    properties["form"] = {"const": form.name, "description": form.what}
+    for parameter in form.parameters:
+        number = {"type": "number", "minimum": parameter.lower, "maximum": parameter.upper}
+        quantity = {
+            "type": "object",
+            "properties": {"value": number, "unit": {"const": parameter.unit}, "std": {"type": "number", "minimum": 0}},
+            "required": ["value"],
+            "additionalProperties": False,
+        }
+        properties[parameter.name] = {
+            "description": f"{parameter.what}, {parameter.unit}",
+            "anyOf": [number, quantity],
+        }
+    required = ["id"] if form is effect.forms[0] else ["id", "form"]
+    required += [parameter.name for parameter in form.parameters if parameter.required]
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+
+
+class EffectEntry(_Part):
     """One effect: `{id, form, <parameter>: {value, unit, std} or a number}`. `form` may be left out."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     id: str
     form: str
@@ -202,9 +240,10 @@ class EffectEntry(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _from_file(cls, data: Any) -> Any:
-        if not isinstance(data, Mapping) or "parameters" in data:
+        if not isinstance(data, Mapping):
             return data
         fields = dict(data)
+        fields |= fields.pop("parameters", None) or {}  # as the fields of this class are named
         name = fields.pop("id", None)
         if not isinstance(name, str):
             raise ValueError("an effect needs an `id`")
@@ -215,7 +254,9 @@ class EffectEntry(BaseModel):
         names = [form.name for form in effects[name].forms]
         if chosen not in names:
             raise ValueError(f"{name} has no form {chosen!r}{nearest(str(chosen), names)}")
-        values = {key: value if isinstance(value, Mapping) else {"value": value} for key, value in fields.items()}
+        values = {
+            key: value if isinstance(value, Mapping | Quantity) else {"value": value} for key, value in fields.items()
+        }
         return {"id": name, "form": chosen, "parameters": values}
 
     @model_validator(mode="after")
@@ -248,8 +289,13 @@ class EffectEntry(BaseModel):
         values = {p.name: given.get(p.name, p.if_left_out) for p in form.parameters}
         return Active(all_effects()[self.id], form, values)
 
-    @model_serializer(mode="wrap")
-    def _to_file(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The file form: one alternative a form of each effect."""
+        return {"title": "Effect", "oneOf": [_form_schema(e, form) for e in all_effects().values() for form in e.forms]}
+
+    @model_serializer(mode="plain")
+    def _to_file(self) -> dict[str, Any]:
         entry: dict[str, Any] = {"id": self.id, "form": self.form}
         for name, quantity in self.parameters.items():
             entry[name] = quantity.model_dump(exclude_none=True)

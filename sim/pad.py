@@ -44,6 +44,9 @@ class Cascade:
         self.pad = pad
         self.effects = tuple(effects)
 
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in self.__dict__.items() if name != "layout"}  # has addresses in it
+
     @cached_property
     def layout(self) -> Layout:
         """The arrays that the compiled loop reads; compiles what is not compiled yet."""
@@ -139,9 +142,12 @@ class Plant:
         self.program = layout.program
         self.parameters = layout.parameters
         self.state = layout.state.copy()
-        self._step = k.plant_step.native
-        self._chain = k.chain.native
+        self._step = k.step.native
+        self._chain = k.chain_step.native
         self._pad = int(layout.program[k.INNER])
+
+    def __reduce__(self) -> str:
+        raise TypeError("a plant belongs to its process; send the model, and make a plant of it there")
 
     def step(self, dt_s: float, motor_side_mm: float) -> float:
         """Move to a true pad-frame position within dt_s (linearly); force at the cell in N, before the sensor."""
@@ -149,15 +155,15 @@ class Plant:
 
     def sense(self, dt_s: float, force_N: float) -> float:
         """The force path (lag, resonance, bias …) over one step: force at the cell → force in the path, N."""
-        return self._chain(self.program, self.parameters, self.state, 0, k.SENSOR, dt_s, force_N)
+        return self._chain(self.program, self.parameters, self.state, k.SENSOR, dt_s, force_N)
 
     def sample(self, dt_s: float, force_N: float) -> float:
         """One sample of the force path: what is reported, dt_s after the last sample (limits, stuck values …)."""
-        return self._chain(self.program, self.parameters, self.state, 0, k.SAMPLING, dt_s, force_N)
+        return self._chain(self.program, self.parameters, self.state, k.SAMPLING, dt_s, force_N)
 
     def reported_mm(self, position_mm: float) -> float:
         """Position as the encoder reports it, for a true one."""
-        return self._chain(self.program, self.parameters, self.state, 0, k.REPORT, 0.0, position_mm)
+        return self._chain(self.program, self.parameters, self.state, k.REPORT, 0.0, position_mm)
 
     @property
     def probe_mm(self) -> float:

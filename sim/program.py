@@ -23,7 +23,7 @@ SOLVED = ("frame", "probe", "depth", "elastic", "rate", "contact", "gap")
 
 @dataclass(frozen=True)
 class Layout:
-    """`program` and `parameters` are shared by all plants of a model and never written; `state` is what each starts from."""
+    """`program` and `parameters` are shared by all plants of a model and not written; each starts from `state`."""
 
     program: NDArray[np.int64]
     parameters: Array
@@ -85,5 +85,4 @@ def lay_out(pad: Pad, effects: Sequence[Active]) -> Layout:
     program[k.STARTS : k.ROWS] = starts
     program[k.ROWS :] = np.array(rows, dtype=np.int64).ravel()
     vector = np.array([*parameters, 0.0])
-    program.flags.writeable = True
     return Layout(program, vector, state)

@@ -8,40 +8,31 @@ with ν_0 = 0, a_i = gain · c_i, and F^e in units of its value at the greatest 
 along by the chain rule of the same recursion; where a unilateral pad has let go, F^e is what makes F = 0, so it too
 depends on all parameters.
 
-These loops call nothing compiled elsewhere: numba's disk cache would not notice an edit there.
+The factors of a step are sim's (sim/kernel.py, sim/relaxation.py), and so is the way of compiling (sim/jit.py).
 """
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from sim.jit import compiled
+from sim.kernel import ramp_gain
+from sim.relaxation import ramp_gain_slope
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True, inline="always")
-def _step_factors(x: float) -> Any:
-    """e^{−x}, φ(x) and their derivatives by log x (= by log ν at fixed dt)."""
-    decay = np.exp(-x)
-    if x < 1e-3:
-        gain = 1.0 - x / 2.0 + x * x / 6.0 - x * x * x / 24.0
-        d_gain = x * (-0.5 + x / 3.0 - x * x / 8.0 + x * x * x / 30.0)
-    else:
-        gain = -np.expm1(-x) / x
-        d_gain = decay - gain
-    return decay, gain, -x * decay, d_gain
-
-
-@njit(cache=True, nogil=True, inline="always")
+@compiled("float64(float64)")
 def _flushed(value: float) -> float:
     """Zero for what has died away: a decaying state would else stay among the slow subnormal numbers."""
     return 0.0 if abs(value) < 1e-250 else value
 
 
-@njit(cache=True, nogil=True)
+@compiled(
+    "void(float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[::1], boolean, float64[::1],"
+    "float64[:, ::1], int64[::1], float64[::1], float64[::1], float64[:, ::1], boolean[::1])"
+)
 def advance(
     dt_s: Array,
     shape: Array,
@@ -76,7 +67,11 @@ def advance(
         if dt_s[j] != last_dt:
             last_dt = dt_s[j]
             for i in range(1, r + 1):
-                decay[i], gain[i], d_decay[i], d_gain[i] = _step_factors(rates[i - 1] * last_dt)
+                x = rates[i - 1] * last_dt
+                gain[i] = ramp_gain(x)
+                decay[i] = 1.0 - x * gain[i]
+                d_decay[i] = -x * decay[i]  # by log ν, as d_gain
+                d_gain[i] = x * ramp_gain_slope(x, gain[i])
         rise = shape[j] - state[0]
         held, per_rise = 0.0, 0.0
         for i in range(r + 1):
@@ -139,7 +134,7 @@ def advance(
                     jacobian[j, k + r + i] += state[i]
 
 
-@njit(cache=True, nogil=True)
+@compiled("float64[:, ::1](float64[::1], float64[::1], float64[::1])")
 def modes(dt_s: Array, elastic: Array, rates: Array) -> Array:
     """h_i of a given elastic response, bonded: (n, M+1), column 0 is `elastic` itself, then one a rate (M,)."""
     n, M = dt_s.shape[0], rates.shape[0]
@@ -151,7 +146,8 @@ def modes(dt_s: Array, elastic: Array, rates: Array) -> Array:
         if dt_s[j] != last_dt:
             last_dt = dt_s[j]
             for i in range(M):
-                decay[i], gain[i], _, _ = _step_factors(rates[i] * last_dt)
+                gain[i] = ramp_gain(rates[i] * last_dt)
+                decay[i] = 1.0 - rates[i] * last_dt * gain[i]
         rise = elastic[j] - before
         before = elastic[j]
         out[j, 0] = elastic[j]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from sim.jit import compiled
 
 from ._kernel import Array
 
@@ -28,7 +29,7 @@ def jitter(position: Array) -> float:
     return float(np.sqrt(np.quantile(squares, 0.25) / 1.923))
 
 
-@njit(cache=True, nogil=True)
+@compiled("int64[:, ::1](float64[::1], float64, int64)")
 def _stretches(position: Array, tolerance: float, least: int) -> NDArray[np.int64]:
     n = position.shape[0]
     found = np.empty((n // least + 1, 2), dtype=np.int64)
@@ -60,7 +61,7 @@ def holds(time_s: Array, position: Array) -> list[slice]:
     reach = float(np.ptp(position))
     tolerance = max(8 * noise, 5e-4 * reach)
     out: list[slice] = []
-    for start, stop in _stretches(position, tolerance, MIN_HOLD):
+    for start, stop in _stretches(np.ascontiguousarray(position), tolerance, MIN_HOLD):
         third = max((stop - start) // 3, 1)
         drift = abs(float(np.mean(position[start : start + third]) - np.mean(position[stop - third : stop])))
         steady = 4 * noise * np.sqrt(2 / third) + 0.15 * tolerance

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bench.errors import InputError
 from bench.recording.types import Measurement
+from sim.pad import union
 
 from ._kernel import Array
 
@@ -132,9 +133,8 @@ def _run(m: Measurement, depth_mm: float, force_N: float) -> tuple[Run, NDArray[
         time, position = m.position_time_s, m.position_mm
         at = np.arange(len(time))
     else:
-        time = np.union1d(m.position_time_s, m.force_time_s)
+        time, at = union(m.position_time_s, m.force_time_s)
         position = np.interp(time, m.position_time_s, m.position_mm)
-        at = np.searchsorted(time, m.force_time_s)
     y, weight = np.zeros(len(time)), np.zeros(len(time))
     y[at] = m.force_N / force_N
     weight[at[_counted(m)]] = 1.0

@@ -9,9 +9,10 @@ import numpy as np
 from . import objective
 from ._kernel import Array
 from .estimate import Estimate
+from .objective import Structure
 from .problem import Problem
 
-MOST = 400_000  # scores kept one by one; beyond, sums over short neighbourhoods
+MOST = 400_000  # samples kept one by one; beyond, neighbours are summed
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,6 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
     scores, sensitivity, errors, surface = _per_sample(problem, estimate)
     total = sum(len(e) for e in errors)
     gamma, lags = _autocovariance(errors)
-    memory = 1 + 2 * float(np.sum(gamma[1:] / gamma[0])) if gamma[0] > 0 else 1.0
     free = _free(estimate)
     inverse = np.zeros((P, P))
     H = estimate.matrix[np.ix_(free, free)]
@@ -50,7 +50,21 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
         if m.surface_std_mm > 0:
             shift = inverse @ surface[j] * (m.surface_std_mm / problem.depth_mm)
             covariance = covariance + np.outer(shift, shift)
-    return Spread(covariance, total / max(memory, 1.0))
+    return Spread(covariance, problem.weight / _memory(gamma))
+
+
+def independent_samples(problem: Problem, x: Array, structure: Structure) -> float:
+    """How many independent samples the residual at x is worth; at least ten."""
+    errors = []
+    for run, (force, _, _) in zip(problem.runs, objective.forces(problem, structure, x), strict=True):
+        errors.append((run.y - force)[run.weight > 0])
+    gamma, _ = _autocovariance(errors)
+    return max(sum(len(e) for e in errors) / _memory(gamma), 10.0)
+
+
+def _memory(gamma: Array) -> float:
+    """1 + 2 Σ ρ: how many samples in a row say the same."""
+    return max(1 + 2 * float(np.sum(gamma[1:] / gamma[0])), 1.0) if gamma[0] > 0 else 1.0
 
 
 def _free(estimate: Estimate) -> np.ndarray:
@@ -72,8 +86,12 @@ def _inverted(H: Array) -> Array:
 
 
 def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
-    """Of each run, over the samples that count: scores w e J, w J, errors; and Jᵀ ∂F/∂(shift of the depth)."""
+    """Of each run, over the samples that count: scores e J, J, e; and Jᵀ ∂F/∂(shift of the depth).
+
+    In long data each row stands for m neighbours: Σ e J, Σ J/√m, Σ e/√m.
+    """
     structure, x = estimate.structure, estimate.x
+    m = max(1, int(np.ceil(problem.weight / MOST)))
     scores, sensitivities, errors, surface = [], [], [], []
     step = 1e-5
     for j, run in enumerate(problem.runs):
@@ -81,22 +99,27 @@ def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list
         pieces = objective.simulate(run, structure, x, derivatives=True)
         above = objective.simulate(run, structure, x, shift=step) if doubtful else None
         below = objective.simulate(run, structure, x, shift=-step) if doubtful else None
-        J_parts, e_parts, moved = [], [], np.zeros(structure.size)
+        score_parts, J_parts, e_parts, moved = [], [], [], np.zeros(structure.size)
         for piece in pieces:
             counts = run.weight[piece.at] > 0
             J = piece.jacobian[counts]
-            J_parts.append(J)
-            e_parts.append(run.y[piece.at][counts] - piece.force[counts])
+            e = run.y[piece.at][counts] - piece.force[counts]
+            score, J_sum, e_sum = _summed(J * e[:, None], m), _summed(J, m), _summed(e[:, None], m)[:, 0]
+            score_parts.append(score)
+            J_parts.append(J_sum / np.sqrt(m))
+            e_parts.append(e_sum / np.sqrt(m))
             if above is not None and below is not None:
                 slope = (next(above).force - next(below).force)[counts] / (2 * step)
-                # The data have the true depth: a fit at a wrong surface moves x by −H⁻¹ Jᵀ ∂F/∂shift.
-                moved -= J.T @ slope
-        J, e = np.concatenate(J_parts), np.concatenate(e_parts)
-        scores.append(J * e[:, None])
-        sensitivities.append(J)
-        errors.append(e)
+                moved += J.T @ slope  # H⁻¹ of it is how far x follows the surface
+        scores.append(np.concatenate(score_parts))
+        sensitivities.append(np.concatenate(J_parts))
+        errors.append(np.concatenate(e_parts))
         surface.append(moved)
     return scores, sensitivities, errors, surface
+
+
+def _summed(rows: Array, m: int) -> Array:
+    return rows if m == 1 or len(rows) == 0 else np.add.reduceat(rows, np.arange(0, len(rows), m), axis=0)
 
 
 def _autocovariance(errors: list[Array]) -> tuple[Array, int]:

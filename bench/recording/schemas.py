@@ -30,6 +30,9 @@ MODEL_FILE = "model.yaml"
 TOUCH_OFF = "touch_off"
 """The event that carries the pad's surface: `surface_mm` (motor frame) and `surface_std_mm`."""
 
+NO_SURFACE = "no_surface"
+"""The event of a run without approach: its depths count from `surface_mm`, the motor's own zero."""
+
 STOPPED = "stopped"
 """The event after which the motion is no longer the protocol's: the axis goes to its safe state."""
 

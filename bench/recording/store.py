@@ -50,9 +50,7 @@ class InlineStore:
     what a power cut takes from a simulated run, the same seed brings back.
     """
 
-    def __init__(
-        self, path: Path, epoch_ns: int, flush_ns: int, topics: tuple[Topic, ...] = RUN_TOPICS
-    ) -> None:
+    def __init__(self, path: Path, epoch_ns: int, flush_ns: int, topics: tuple[Topic, ...] = RUN_TOPICS) -> None:
         self.problem: str | None = None
         self.lost = 0
         self._path = path

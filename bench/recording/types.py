@@ -73,7 +73,8 @@ class Recording:
 
     `surface_mm` is where the pad's surface stands in the motor frame, by touch-off (`surface_std_mm` its standard
     deviation); None while it is not known. CSV data are in the pad frame already: surface 0, std 0.
-    `run` is the `padbench.run` record, `result` the `padbench.result` record (None: the run did not finish).
+    `run` is the `padbench.run` record, `result` the `padbench.result` record (None: the run did not finish, or
+    there was none: CSV). The truth of a simulated bench (`padbench.simulation`) is not here: nothing that fits may see it.
     """
 
     source: Path
@@ -87,6 +88,12 @@ class Recording:
     result: dict[str, str] | None = None
     attachments: dict[str, bytes] = field(default_factory=dict)
     extra: dict[str, Array] = field(default_factory=dict)
+    """Further columns of a CSV file, shape (k,) each, at `extra_time_s`; NaN where a cell is empty."""
+    extra_text: dict[str, list[str]] = field(default_factory=dict)
+    """Further columns that are not numbers, likewise."""
+    extra_time_s: Array = field(default_factory=lambda: np.empty(0))
+    notes: list[str] = field(default_factory=list)
+    """What was taken for what on reading (separators, units), in plain words."""
     lost: str | None = None
     """What could not be read (a torn or damaged file), in plain words."""
 

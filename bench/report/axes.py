@@ -17,16 +17,16 @@ from bench.report.style import light
 
 Array = NDArray[np.float64]
 
-WIDE = 940.0
+WIDE = 860.0
 """Width of a plot that takes the whole page, in points."""
-HALF = 470.0
-_LEFT, _RIGHT = 58.0, 14.0
+HALF = 430.0
+_LEFT, _RIGHT, _GAP = 58.0, 12.0, 30.0
 
 PHASES = ("tare", "approach", "precondition", "steps", "finish")
 """Phases of a run; each is also the name of its colour."""
 
 
-def panels(figure: Figure, heights: Sequence[float], *, top: float = 30.0, share: bool = True) -> list[Axes]:
+def panels(figure: Figure, heights: Sequence[float], *, top: float = 30.0) -> list[Axes]:
     """Panels one above the other, `heights` in points, with a common x axis labelled at the lowest.
 
     The figure's height must be `stacked(heights, top)`. All margins are fixed, so that the panels of every page
@@ -39,11 +39,10 @@ def panels(figure: Figure, heights: Sequence[float], *, top: float = 30.0, share
     for height in heights:
         y -= height
         box = (_LEFT / width, y / total, (width - _LEFT - _RIGHT) / width, height / total)
-        made.append(figure.add_axes(box, sharex=made[0] if made and share else None))
-        y -= 14.0 if share else 46.0
-    if share:
-        for ax in made[:-1]:
-            ax.tick_params(labelbottom=False)
+        made.append(figure.add_axes(box, sharex=made[0] if made else None))
+        y -= _GAP
+    for ax in made[:-1]:
+        ax.tick_params(labelbottom=False)
     for ax in made:
         ax.yaxis.set_label_coords(-44.0 / (width - _LEFT - _RIGHT), 0.5)
     return made
@@ -51,7 +50,7 @@ def panels(figure: Figure, heights: Sequence[float], *, top: float = 30.0, share
 
 def stacked(heights: Sequence[float], top: float = 30.0) -> float:
     """Height of the figure that holds `panels(heights)`, in points."""
-    return top + sum(heights) + 14.0 * (len(heights) - 1) + 42.0
+    return top + sum(heights) + _GAP * (len(heights) - 1) + 42.0
 
 
 def line(
@@ -71,14 +70,17 @@ def line(
     ax.plot(x, y, style, color=light(colour), lw=width, label=label or "_nolegend_")
 
 
-def legend(ax: Axes, *, above: bool = True) -> None:
-    """A legend in one line above the axes, where it never covers data (or inside, where it fits best)."""
+def legend(ax: Axes, *, above: bool = True, from_x: float = 0.0) -> None:
+    """A legend in one line above the axes, at their left, where it covers no data and a narrow screen shows it.
+
+    `from_x`: where it begins, as a share of the axes' width. With `above` false it goes inside, where it fits best.
+    """
     handles, _ = ax.get_legend_handles_labels()
     if not handles:
         return
     if above:
         ax.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.01), ncols=len(handles), columnspacing=1.4, handlelength=1.8
+            loc="lower left", bbox_to_anchor=(from_x, 1.01), ncols=len(handles), columnspacing=1.4, handlelength=1.8
         )
     else:
         ax.legend(loc="best", handlelength=1.8)
@@ -86,41 +88,43 @@ def legend(ax: Axes, *, above: bool = True) -> None:
 
 @dataclass(frozen=True)
 class Span:
-    """A stretch of time with a name and the phase it belongs to."""
+    """A stretch of time and the step mark that it begins with."""
 
     from_s: float
     to_s: float
-    phase: str
-    name: str
+    mark: StepMark
+
+    @property
+    def phase(self) -> str:
+        """The phase of the run it belongs to."""
+        return self.mark.phase
 
 
 def step_spans(marks: Sequence[StepMark], end_s: float) -> list[Span]:
     """The stretch of each step mark: up to the next one, the last up to `end_s`."""
     ordered = sorted(marks, key=lambda mark: mark.time_s)
-    ends = [mark.time_s for mark in ordered[1:]] + [end_s]
-    return [
-        Span(mark.time_s, max(end, mark.time_s), mark.phase, mark.name)
-        for mark, end in zip(ordered, ends, strict=True)
-    ]
+    ends = [mark.time_s for mark in ordered] + [end_s]
+    return [Span(mark.time_s, max(end, mark.time_s), mark) for mark, end in zip(ordered, ends[1:], strict=True)]
 
 
-def phase_spans(spans: Sequence[Span]) -> list[Span]:
-    """Neighbouring stretches of one phase as one."""
-    joined: list[Span] = []
+def joined(spans: Sequence[Span], *, by_name: bool = False) -> list[Span]:
+    """Neighbouring stretches of one phase as one; with `by_name`, of one step (its ramp and its hold)."""
+    found: list[Span] = []
     for span in spans:
-        if joined and joined[-1].phase == span.phase:
-            joined[-1] = Span(joined[-1].from_s, span.to_s, span.phase, span.phase)
+        same = found and found[-1].phase == span.phase and (not by_name or found[-1].mark.name == span.mark.name)
+        if same:
+            found[-1] = Span(found[-1].from_s, span.to_s, found[-1].mark)
         else:
-            joined.append(Span(span.from_s, span.to_s, span.phase, span.phase))
-    return joined
+            found.append(span)
+    return found
 
 
 def shade(axes: Sequence[Axes], spans: Sequence[Span], *, named: bool = True) -> None:
     """Tint the phases and, within the steps, every other step; write the phases' names where there is room."""
     if not spans:
         return
-    phases = phase_spans(spans)
-    steps = [span for span in spans if span.phase == "steps"]
+    phases = joined(spans)
+    steps = [span for span in joined(spans, by_name=True) if span.phase == "steps"]
     for ax in axes:
         for phase in phases:
             if phase.phase != "steps":
@@ -129,19 +133,21 @@ def shade(axes: Sequence[Axes], spans: Sequence[Span], *, named: bool = True) ->
         if len(steps) <= 120:
             for i, span in enumerate(steps):
                 if i % 2 == 0:
-                    ax.axvspan(span.from_s, span.to_s, color=light("steps"), alpha=0.3, lw=0, zorder=0)
+                    ax.axvspan(span.from_s, span.to_s, color=light("steps"), alpha=0.26, lw=0, zorder=0)
     if named:
         _name_phases(axes[0], phases)
 
 
 def _name_phases(ax: Axes, phases: Sequence[Span]) -> None:
+    floor, ceiling = ax.get_ylim()
+    ax.set_ylim(floor, ceiling + 0.09 * (ceiling - floor))  # a free line above the data for the names
     low, high = ax.get_xlim()
     room = ax.get_position().width * WIDE
     for phase in phases:
         share = (min(phase.to_s, high) - max(phase.from_s, low)) / max(high - low, 1e-12)
-        if share * room > 6.2 * len(phase.name) + 6:
+        if share * room > 6.2 * len(phase.phase) + 6:
             ax.annotate(
-                phase.name,
+                phase.phase,
                 ((phase.from_s + phase.to_s) / 2, 0.985),
                 xycoords=("data", "axes fraction"),
                 ha="center",
@@ -176,10 +182,14 @@ def mark(axes: Sequence[Axes], events: Sequence[tuple[int, Event]]) -> None:
             str(number),
             (event.time_s, 0.0),
             xycoords=("data", "axes fraction"),
-            xytext=(2, 3 + 12 * (level % 6)),
+            xytext=(0, 7 + 14 * (level % 6)),
             textcoords="offset points",
-            fontsize=9.5,
+            ha="center",
+            va="center",
+            fontsize=9,
             color=light("event"),
+            bbox={"boxstyle": "round,pad=0.18", "fc": light("paper"), "ec": light("event"), "lw": 0.7},
+            zorder=5,
         )
 
 

@@ -52,10 +52,17 @@ def _verdicts(runs: Runs) -> str:
     for name, fit in runs:
         rmse, floor = forces(fit.number("rmse"), fit.number("noise_floor"))
         percent = fit.number("fit_percent")
-        said = verdict.fit_verdict(fit, "").headline
-        rows.append([name, verdict.structure(fit), f"{percent:.2f} %" if math.isfinite(percent) else "–", rmse, floor, said])
+        said = verdict.judge(fit)[1]
+        shown = f"{percent:.2f} %" if math.isfinite(percent) else "–"
+        rows.append([name, _structure(fit), shown, rmse, floor, said])
     head = ["run", "model", "fit", "error, rms", "noise floor, rms", "verdict"]
     return markup.table(head, rows, numeric=(2, 3, 4))
+
+
+def _structure(fit: FitView) -> str:
+    given = (fit.json.get(key) for key in ("law", "order", "contact"))
+    law, order, contact = ("" if value is None else str(value) for value in given)
+    return ", ".join(part for part in (law, f"{order} modes" if order != "1" else "1 mode", contact) if part)
 
 
 def _curves(runs: Runs) -> str:
@@ -141,6 +148,7 @@ def _interval_plot(key: str, name: str, entries: list[tuple[int, float, float, s
         ax.set_yticks(range(len(entries)), [_fitting(runs[i][0]) for i, *_ in entries])
         ax.set_ylim(len(entries) - 0.5, -0.5)
         ax.margins(x=0.08)
+        ax.locator_params(axis="x", nbins=5)
         unit = entries[0][3]
         ax.set_xlabel(f"{numbers.symbol(name)}, {unit}" if unit not in ("", "1") else numbers.symbol(name))
 

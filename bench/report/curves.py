@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
 from bench.recording.types import Recording
@@ -25,14 +26,15 @@ MOST_POINTS = 12_000
 def indentation(recording: Recording, fit: FitView | None) -> str:
     """Force against depth, measured coloured from early to late, simulated over it; empty without both channels."""
     time_s, depth, measured = _in_pad_frame(recording, fit)
-    if time_s.size < 2:
+    if time_s.size < 2 or not (np.isfinite(depth) & np.isfinite(measured)).any():
         return ""
     height = 380.0
 
     def draw(figure: Figure) -> None:
         [ax] = parts.panels(figure, [height])
         width = ax.get_position().width * parts.WIDE
-        cell_x, cell_y = np.ptp(depth) / width or 1.0, _span(measured) / height or 1.0
+        # half a pixel: finer than an eye sees, so that lines stay smooth
+        cell_x, cell_y = 0.5 * _span(depth) / width or 1.0, 0.5 * _span(measured) / height or 1.0
         edges = np.linspace(time_s[0], time_s[-1], len(TIME_RAMP) + 1)
         pieces = []
         for i in range(len(TIME_RAMP)):
@@ -41,22 +43,25 @@ def indentation(recording: Recording, fit: FitView | None) -> str:
             pieces.append(thin_path(depth[first:last], measured[first:last], cell_x, cell_y))
         heavy = sum(x.size for x, _ in pieces) > MOST_POINTS
         for i, (x, y) in enumerate(pieces):
-            ax.plot(x, y, color=light(f"time-{i}"), lw=1.5, rasterized=heavy)
+            ax.plot(x, y, color=light(f"time-{i}"), lw=2.6, rasterized=heavy)
         if fit is not None:
             x, y = thin_path(depth, fit.simulated_N, cell_x, cell_y)
             heavy = x.size > MOST_POINTS
-            ax.plot(x, y, color=light("simulated"), lw=0.9, rasterized=heavy, label="simulated")
+            ax.plot(x, y, color=light("simulated"), lw=0.8, rasterized=heavy, label="simulated")
+        deepest, highest = float(np.nanmax(depth)), float(np.nanmin(depth))
+        if deepest > 0.05 * (deepest - highest):  # the way through air says little: only its end is shown
+            ax.set_xlim(max(highest - 0.01 * deepest, -0.12 * deepest), 1.02 * deepest)
         ax.set_xlabel("depth, mm")
         ax.set_ylabel("force, N")
         _time_bar(ax, time_s)
         if fit is not None:
-            ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), handlelength=1.8)
+            parts.legend(ax, from_x=0.46)
 
     return render("indentation", "Force against indentation", parts.WIDE, parts.stacked([height]), draw)
 
 
 def _in_pad_frame(recording: Recording, fit: FitView | None) -> tuple[Array, Array, Array]:
-    """Time, depth and force at the force stamps, from the first step on (with its approach where there is no fit)."""
+    """Time, depth and force at the force stamps: those of the fit, or else from the preconditioning on."""
     if fit is not None:
         return fit.time_s, fit.position_mm, fit.measured_N
     motor, cell = recording.motor, recording.load_cell
@@ -80,14 +85,16 @@ def _span(values: Array) -> float:
 
 def _time_bar(ax: Axes, time_s: Array) -> None:
     """The key of the colours, above the axes: from the first to the last second."""
-    bar = ax.inset_axes((0.09, 1.025, 0.22, 0.022))
+    bar = ax.inset_axes((0.15, 1.025, 0.22, 0.022))
     for i in range(len(TIME_RAMP)):
         bar.axvspan(i, i + 1, color=light(f"time-{i}"), lw=0)
     bar.set_xlim(0, len(TIME_RAMP))
     bar.axis("off")
     height = 1.036
-    ax.text(0.08, height, f"measured, {time_s[0]:.4g} s", transform=ax.transAxes, ha="right", va="center", fontsize=10.5)
-    ax.text(0.32, height, f"{time_s[-1]:.4g} s", transform=ax.transAxes, ha="left", va="center", fontsize=10.5)
+    ax.text(
+        0.14, height, f"measured, {time_s[0]:.1f} s", transform=ax.transAxes, ha="right", va="center", fontsize=10.5
+    )
+    ax.text(0.38, height, f"{time_s[-1]:.1f} s", transform=ax.transAxes, ha="left", va="center", fontsize=10.5)
 
 
 def elastic(curves: Sequence[tuple[str, Curve]]) -> str:
@@ -97,7 +104,9 @@ def elastic(curves: Sequence[tuple[str, Curve]]) -> str:
 
 def relaxation(curves: Sequence[tuple[str, Curve]]) -> str:
     """g over time on a logarithmic axis, with a 95 % band where its doubt is known."""
-    return _curves("relaxation", "Reduced relaxation", curves, "time after a step, s", "g(t), of 1", log=True)
+    return _curves(
+        "relaxation", "Reduced relaxation", curves, "time after a step, s", "share of force left, g(t)", log=True
+    )
 
 
 def _curves(name: str, label: str, curves: Sequence[tuple[str, Curve]], x: str, y: str, *, log: bool) -> str:
@@ -110,6 +119,8 @@ def _curves(name: str, label: str, curves: Sequence[tuple[str, Curve]], x: str, 
             _band(ax, curve, colour, run, ("-", "--", "-.", ":")[(i // 7) % 4] if len(curves) > 7 else "-", log)
         if log:
             ax.set_xscale("log")
+            ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            ax.xaxis.set_minor_locator(NullLocator())
             ax.set_ylim(top=max(1.02, ax.get_ylim()[1]))
             low = ax.get_ylim()[0]
             ax.set_ylim(bottom=max(0.0, low) if low > -0.02 else low)
@@ -130,4 +141,4 @@ def _band(ax: Axes, curve: Curve, colour: str, run: str, style: str, log: bool) 
     if curve.std is not None:
         doubt = 1.96 * np.nan_to_num(curve.std[good])
         label = "95 % band" if not run else "_nolegend_"
-        ax.fill_between(x, y - doubt, y + doubt, color=light(colour), alpha=0.22, lw=0, label=label)
+        ax.fill_between(x, y - doubt, y + doubt, color=light(colour), alpha=0.12 if run else 0.22, lw=0, label=label)

@@ -12,7 +12,7 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.recording.types import Event, Recording
+from bench.recording.types import Event, Recording, StepMark
 from bench.report import markup
 from bench.report.markup import digits
 
@@ -53,7 +53,8 @@ def was(recording: Recording) -> str:
     pairs: list[tuple[str, object]] = []
     for key, name in _NAMES.items():
         if key in run:
-            pairs.append((name, _plain(run.pop(key))))
+            value = _plain(run.pop(key))
+            pairs.append((name, value.replace("T", " ", 1) if key in ("started", "date") else value))
     rest = [(key.replace("_", " "), _plain(value)) for key, value in sorted(run.items())]
     if not recording.run:
         pairs.append(("Data", recording.source.name))
@@ -74,7 +75,7 @@ def _plain(value: str) -> str:
     if isinstance(found, bool):
         return "yes" if found else "no"
     if isinstance(found, Mapping):
-        return "\n".join(f"{key}: {_word(item)}" for key, item in found.items())
+        return "\n".join(markup.named(str(key), _word(item)) for key, item in found.items())
     if isinstance(found, list):
         return ", ".join(_word(item) for item in found)
     return "" if found is None else found if isinstance(found, str) else value
@@ -82,7 +83,7 @@ def _plain(value: str) -> str:
 
 def _word(value: Any) -> str:
     if isinstance(value, float):
-        return digits(value, 6)
+        return f"{value:.6g}"
     if isinstance(value, (Mapping, list)):
         return json.dumps(value, ensure_ascii=False)
     return "–" if value is None else str(value)
@@ -169,12 +170,13 @@ def touch_off(recording: Recording) -> str:
     pairs: list[tuple[str, object]] = []
     for event in recording.events:
         if event.name in ("tare", "touch_off", "touch", "home", "homed", "surface"):
-            pairs.append((f"{event.name.replace('_', ' ')} at {event.time_s:.3f} s", _event_data(event)))
+            data = _event_data(event)
+            pairs.append((event.name.replace("_", " "), f"at {event.time_s:.3f} s" + (f": {data}" if data else "")))
     return said + markup.facts(pairs)
 
 
 def _event_data(event: Event) -> str:
-    return ", ".join(f"{key} {_word(value)}" for key, value in event.data.items()) or "no further data"
+    return ", ".join(markup.named(key, _word(value)) for key, value in event.data.items())
 
 
 def event_table(recording: Recording, marked: Sequence[tuple[int, Event]]) -> str:
@@ -192,21 +194,21 @@ def event_table(recording: Recording, marked: Sequence[tuple[int, Event]]) -> st
     return body
 
 
-def steps_table(recording: Recording) -> str:
-    """The steps as they were run."""
+def steps_table(steps: Sequence[StepMark]) -> str:
+    """The steps as they were run, or are planned."""
     rows = [
         [
             mark.name,
             mark.phase,
             mark.kind.replace("_", " "),
             f"{mark.time_s:.3f}",
-            digits(mark.target_mm) if math.isfinite(mark.target_mm) else "",
-            digits(mark.speed_mm_s) if math.isfinite(mark.speed_mm_s) else "",
+            f"{mark.target_mm:.6g}" if math.isfinite(mark.target_mm) else "",
+            f"{mark.speed_mm_s:.6g}" if math.isfinite(mark.speed_mm_s) else "",
         ]
-        for mark in recording.steps[:400]
+        for mark in steps[:400]
     ]
     head = ["step", "phase", "kind", "start, s", "target, mm", "speed, mm/s"]
-    more = len(recording.steps) - len(rows)
+    more = len(steps) - len(rows)
     said = f"<p>{more} more in the recording.</p>" if more > 0 else ""
     return markup.table(head, rows, numeric=(3, 4, 5)) + said
 

@@ -51,7 +51,8 @@ def facts(pairs: Iterable[tuple[str, object]]) -> str:
     shown = [(name, value) for name, value in pairs if str(value).strip()]
     if not shown:
         return ""
-    return "<dl>" + "".join(f"<dt>{text(name)}</dt><dd>{text(value)}</dd>" for name, value in shown) + "</dl>\n"
+    lines = "".join(f"<div><dt>{text(name)}</dt><dd>{text(value)}</dd></div>" for name, value in shown)
+    return f"<dl>{lines}</dl>\n"
 
 
 def table(
@@ -121,6 +122,48 @@ def digits(value: float, significant: int = 4) -> str:
     if size < -5 or size > 6:
         return f"{rounded:.{significant - 1}e}".replace("-", "−")
     return f"{rounded:.{max(0, significant - 1 - size)}f}".replace("-", "−")
+
+
+def column(values: Sequence[float], significant: int = 3) -> list[str]:
+    """Numbers of one column with the same decimals: the smallest shows so many significant digits."""
+    sizes = [abs(value) for value in values if math.isfinite(value) and value != 0]
+    places = max(0, significant - 1 - math.floor(math.log10(min(sizes)))) if sizes else 0
+    if places > 9:
+        return [digits(value, significant) for value in values]
+    return [f"{value:.{places}f}".replace("-", "−") if math.isfinite(value) else "–" for value in values]
+
+
+_SUFFIXES = {
+    "mm_s": "mm/s",
+    "mm_s2": "mm/s²",
+    "N_mm": "N/mm",
+    "N_s": "N/s",
+    "mm": "mm",
+    "um": "µm",
+    "N": "N",
+    "mN": "mN",
+    "s": "s",
+    "ms": "ms",
+    "us": "µs",
+    "Hz": "Hz",
+    "kg": "kg",
+    "g": "g",
+    "ppm": "ppm",
+    "percent": "%",
+    "C": "°C",
+    "A": "A",
+    "V": "V",
+}
+
+
+def named(key: str, value: str) -> str:
+    """A figure whose name carries its unit, for reading: ("surface_mm", "3.217") → "surface 3.217 mm"."""
+    for parts in (2, 1):
+        words = key.rsplit("_", parts)
+        unit = _SUFFIXES.get("_".join(words[1:]))
+        if unit and len(words) == parts + 1 and words[0]:
+            return f"{words[0].replace('_', ' ')} {value} {unit}"
+    return f"{key.replace('_', ' ')} {value}"
 
 
 def measured(value: float, std: float) -> tuple[str, str]:

@@ -60,7 +60,10 @@ def parameters(fit: FitView) -> str:
         said = ", ".join(part for part in (meaning(name), time_constant(name, value), remark) if part)
         rows.append([symbol(name), shown, doubt, unit, relative, said])
         styles.append("off" if undetermined else "")
-    head = ["parameter", "value", "std", "unit", "relative", "meaning"]
+    if "c_0" not in given and "c_1" in given:
+        rest = 1.0 - sum(of(entry)[0] for name, entry in given.items() if str(name).startswith("c_"))
+        rows.append([symbol("c_0"), digits(rest), "–", "1", "–", f"{meaning('c_0')}, from the others: 1 − Σ cᵢ"])
+    head = ["parameter", "value", "std. dev.", "unit", "relative", "meaning"]
     formula = LAWS.get(str(fit.json.get("law")), ("", ""))[1]
     said = f"<p><code>{markup.text(formula)}</code> &nbsp; <code>g(t) = c₀ + Σ cᵢ·e^(−νᵢ·t)</code></p>\n"
     return (said if formula else "") + markup.table(head, rows, numeric=(1, 2, 4), styles=styles)
@@ -111,11 +114,13 @@ def evidence(rows: list[Evidence]) -> str:
     head = ["law", "order", *(["contact"] if contacts else []), f"error, {unit} rms"]
     head += [f"held out, {unit} rms"] if held else []
     head += ["criterion above the best", "remark"] if ruled else ["remark"]
+    errors = markup.column([scale * row.rmse_N for row in rows])
+    left_out = markup.column([scale * row.held_out_rmse_N for row in rows])
     lines = []
-    for row in rows:
-        line = [row.law, str(row.order), *([row.contact] if contacts else []), digits(scale * row.rmse_N, 4)]
-        line += [digits(scale * row.held_out_rmse_N, 4)] if held else []
-        line += [digits(row.criterion - least, 4)] if ruled else []
+    for row, error, other in zip(rows, errors, left_out, strict=True):
+        line = [row.law, str(row.order), *([row.contact] if contacts else []), error]
+        line += [other] if held else []
+        line += [f"{row.criterion - least:.1f}" if math.isfinite(row.criterion) else "–"] if ruled else []
         lines.append([*line, ", ".join(x for x in ("chosen" if row.chosen else "", row.remark) if x)])
     right = tuple(i for i, name in enumerate(head) if name not in ("law", "contact", "remark"))
     return markup.table(head, lines, numeric=right, styles=["chosen" if row.chosen else "" for row in rows])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from bench.recording.types import Recording
+from bench.recording.types import Event, Recording
 from bench.report import axes, curves, facts, markup, numbers, plots, verdict
 from bench.report.markup import figure, forces, section
 from bench.report.verdict import Verdict
@@ -59,9 +59,9 @@ def report_page(
         ("files", "Files beside this page", beside),
     ]
     there = [(anchor, name, body) for anchor, name, body in sections if body]
-    links = "".join(f'<a href="#{anchor}">{markup.text(name)}</a>' for anchor, name, _ in there)
+    links = " ".join(f'<a href="#{anchor}">{markup.text(name)}</a>' for anchor, name, _ in there)
     body = (
-        f"<h1>{markup.text(heading)}</h1>\n<p class=\"sub\">{markup.text(_subtitle(recording))}</p>\n"
+        f'<h1>{markup.text(heading)}</h1>\n<p class="sub">{markup.text(_subtitle(recording))}</p>\n'
         + _verdicts(recording, fit, fit_problem)
         + f"<nav>{links}</nav>\n"
         + "".join(section(name, content, anchor) for anchor, name, content in there)
@@ -86,7 +86,7 @@ def _subtitle(recording: Recording) -> str:
     simulated = run.get("simulated", "").strip('"').lower()
     kind = "simulated bench" if simulated in ("true", "yes", "1") else ""
     started = run.get("started") or run.get("date") or ""
-    when = started.strip('"')
+    when = started.strip('"').replace("T", " ")
     return " · ".join(part for part in (when, kind, f"{high - low:.1f} s recorded") if part)
 
 
@@ -94,7 +94,8 @@ def _verdicts(recording: Recording, fit: FitView | None, problem: str) -> str:
     of_run = verdict.run_verdict(recording)
     of_fit = verdict.fit_verdict(fit, problem)
     body = _card(of_run, "") if of_run else ""
-    notes = list(fit.notes) if fit is not None else []
+    notes = [*recording.notes, *(fit.notes if fit is not None else ())]
+    notes = list(dict.fromkeys(notes))  # a fit repeats what it heard on reading
     extra = (_tiles(fit) if fit is not None else "") + markup.bullets(notes, "warn")
     return body + _card(of_fit, extra)
 
@@ -119,18 +120,16 @@ def _tiles(fit: FitView) -> str:
     return markup.tiles(shown)
 
 
-def _trajectory(recording: Recording, plan: Plan | None, events: list[tuple[int, axes.Event]]) -> str:
+def _trajectory(recording: Recording, plan: Plan | None, events: list[tuple[int, Event]]) -> str:
     if recording.motor.time_s.size == 0:
         return "<p>The recording holds no position.</p>"
     said = "Commanded and measured position; phases are tinted, every other step too, and numbers mark events."
     body = figure(plots.trajectory(recording, plan, events), said)
     body += markup.folded(f"Events ({len(recording.events)})", facts.event_table(recording, events))
-    return body + markup.folded(f"Steps ({len(recording.steps)})", facts.steps_table(recording))
+    return body + markup.folded(f"Steps ({len(recording.steps)})", facts.steps_table(recording.steps))
 
 
-def _force(
-    recording: Recording, fit: FitView | None, plan: Plan | None, events: list[tuple[int, axes.Event]]
-) -> str:
+def _force(recording: Recording, fit: FitView | None, plan: Plan | None, events: list[tuple[int, Event]]) -> str:
     if recording.load_cell.time_s.size == 0:
         return "<p>The recording holds no force.</p>"
     said = "Net force of the load cell, positive in compression."
@@ -144,7 +143,9 @@ def _force(
 
 def _indentation(recording: Recording, fit: FitView | None) -> str:
     svg = curves.indentation(recording, fit)
-    said = "Loops are what relaxation takes; a loop that drifts from cycle to cycle is conditioning, damage or creep."
+    said = (
+        "The area of a loop is energy that the pad took. Loops that lie on one another say that the pad did not change."
+    )
     return figure(svg, said) if svg else ""
 
 

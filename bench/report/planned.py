@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bench.report import axes as parts
-from bench.report import markup
+from bench.report import facts, markup
 from bench.report.markup import digits, figure, section
 from bench.report.style import light
 from bench.report.svg import render
@@ -33,10 +33,10 @@ def plan_page(plan: PlanView, title: str = "Planned run") -> str:
     if plan.expected_N is None:
         caption = "Planned depth. No pad model is believed, so no force is expected. Dashed: limits."
     body += section("Plan", figure(trajectory(plan), caption) if plan.time_s.size else "")
-    limits = [(name.replace("_", " "), f"{digits(value)} {unit}") for name, (value, unit) in plan.limits.items()]
+    limits = [(name.replace("_", " "), f"{value:.6g} {unit}") for name, (value, unit) in plan.limits.items()]
     body += section("Limits", markup.facts(limits))
     body += section("What is planned", markup.facts(plan.facts.items()))
-    body += section("Steps", _steps(plan))
+    body += section("Steps", facts.steps_table(plan.steps))
     return markup.page(title, body + "<footer>Written by padbench. Units: mm, N, s.</footer>")
 
 
@@ -44,7 +44,9 @@ def verdict_of(plan: PlanView) -> Verdict:
     """May it run, and what are the extremes of the plan?"""
     said = []
     if plan.time_s.size:
-        said.append(f"It takes {digits(float(plan.time_s[-1] - plan.time_s[0]))} s and goes {_most(plan.position_mm)} mm deep.")
+        said.append(
+            f"It takes {digits(float(plan.time_s[-1] - plan.time_s[0]))} s and goes {_most(plan.position_mm)} mm deep."
+        )
     if plan.expected_N is not None and np.isfinite(plan.expected_N).any():
         said.append(f"The expected force reaches {_most(plan.expected_N)} N.")
     if plan.problems:
@@ -85,22 +87,6 @@ def trajectory(plan: PlanView) -> str:
 def _limit(ax: Axes, plan: PlanView, name: str) -> None:
     if name in plan.limits:
         value, unit = plan.limits[name]
-        ax.axhline(value, color=light("event"), lw=1.4, ls=(0, (6, 3)), label=f"limit {digits(value)} {unit}")
+        ax.axhline(value, color=light("event"), lw=1.4, ls=(0, (6, 3)), label=f"limit {value:.6g} {unit}")
         low, high = ax.get_ylim()
         ax.set_ylim(low, max(high, value + 0.06 * (value - low)))
-
-
-def _steps(plan: PlanView) -> str:
-    rows = [
-        [
-            step.name,
-            step.phase,
-            step.kind.replace("_", " "),
-            f"{step.time_s:.3f}",
-            digits(step.target_mm) if np.isfinite(step.target_mm) else "",
-            digits(step.speed_mm_s) if np.isfinite(step.speed_mm_s) else "",
-        ]
-        for step in plan.steps[:400]
-    ]
-    head = ["step", "phase", "kind", "start, s", "target, mm", "speed, mm/s"]
-    return markup.table(head, rows, numeric=(3, 4, 5))

@@ -32,8 +32,8 @@ def trajectory(recording: Recording, plan: Plan | None, events: Sequence[tuple[i
         zero = offset or 0.0
         if plan is not None and offset is not None:
             parts.line(ax, plan.time_s, plan.position_mm, "expected", "planned", style=":", width=1.6)
-        parts.line(ax, motor.time_s, motor.command_mm - zero, "commanded", "commanded", width=2.4)
-        parts.line(ax, motor.time_s, motor.position_mm - zero, "measured", "measured", width=1.1)
+        parts.line(ax, motor.time_s, motor.command_mm - zero, "commanded", "commanded", width=3.2)
+        parts.line(ax, motor.time_s, motor.position_mm - zero, "measured", "measured", width=1.0)
         if offset is not None:
             ax.axhline(0.0, color=light("noise"), lw=1.0, ls="--", zorder=1, label="pad surface")
         ax.set_ylabel("depth, mm" if offset is not None else "motor position, mm")
@@ -47,7 +47,7 @@ def trajectory(recording: Recording, plan: Plan | None, events: Sequence[tuple[i
 
 def force(recording: Recording, fit: FitView | None, plan: Plan | None, events: Sequence[tuple[int, Event]]) -> str:
     """Force measured and simulated over the whole run; with a fit, what is left of it beneath."""
-    heights = [230.0] if fit is None else [230.0, 110.0]
+    heights = [230.0] if fit is None else [230.0, 120.0]
     cell = recording.load_cell
 
     def draw(figure: Figure) -> None:
@@ -55,11 +55,11 @@ def force(recording: Recording, fit: FitView | None, plan: Plan | None, events: 
         ax = made[0]
         low, high = parts.time_span(recording)
         ax.set_xlim(low, high)
-        parts.line(ax, cell.time_s, cell.force_N, "measured", "measured", width=1.5)
+        parts.line(ax, cell.time_s, cell.force_N, "measured", "measured", width=2.4)
         if plan is not None and plan.expected_N is not None:
             parts.line(ax, plan.time_s, plan.expected_N, "expected", "expected before the run", style=":", width=1.4)
         if fit is not None:
-            parts.line(ax, fit.time_s, fit.simulated_N, "simulated", "simulated", width=1.0)
+            parts.line(ax, fit.time_s, fit.simulated_N, "simulated", "simulated", width=1.1)
             _residual(made[1], fit)
         if cell.flagged.any():
             bad = np.flatnonzero(cell.flagged)[:2000]
@@ -101,6 +101,9 @@ def corner(recording: Recording, fit: FitView | None) -> str:
     if window is None:
         return ""
     start, end = window
+    whole = parts.time_span(recording)
+    if end - start > 0.5 * (whole[1] - whole[0]):
+        return ""  # the plots above show it already
     low, high = start - 0.6 * (end - start), end + 2.2 * (end - start)
     heights = [130.0, 180.0]
     motor, cell = recording.motor, recording.load_cell
@@ -139,13 +142,11 @@ def fastest_ramp(recording: Recording) -> tuple[float, float] | None:
     if motor.time_s.size < 4:
         return None
     _, end_s = parts.time_span(recording)
-    marks = sorted(recording.steps, key=lambda mark: mark.time_s)
-    ends = [mark.time_s for mark in marks[1:]] + [end_s]
     ramps = [
-        (mark.speed_mm_s, mark.time_s, end)
-        for mark, end in zip(marks, ends, strict=True)
-        if mark.kind in ("ramp", "force_ramp") and mark.phase == "steps" and mark.speed_mm_s > 0
-        if end > mark.time_s and motor.time_s[0] <= mark.time_s < motor.time_s[-1]
+        (span.mark.speed_mm_s, span.from_s, span.to_s)
+        for span in parts.step_spans(recording.steps, end_s)
+        if span.mark.kind in ("ramp", "force_ramp") and span.phase == "steps" and span.mark.speed_mm_s > 0
+        if span.to_s > span.from_s and motor.time_s[0] <= span.from_s < motor.time_s[-1]
     ]
     if ramps:
         top = max(speed for speed, _, _ in ramps)
@@ -162,11 +163,14 @@ def _travel(recording: Recording, start: float, end: float) -> float:
 def _fastest_motion(time_s: Array, position_mm: Array) -> tuple[float, float] | None:
     good = np.isfinite(position_mm)
     t, x = time_s[good], position_mm[good]
-    reach = max(1, t.size // 2000)  # over some samples, so that encoder noise is not taken for speed
-    if t.size < 2 * reach + 2:
+    if t.size < 6:
         return None
-    gap = t[2 * reach :] - t[: -2 * reach]
-    speed = np.abs(x[2 * reach :] - x[: -2 * reach]) / np.where(gap > 0, gap, np.inf)
+    noise = float(np.median(np.abs(np.diff(x, 2)))) / (0.6745 * math.sqrt(6.0))
+    reach, speed = 1, _speed(t, x, 1)
+    # over as few samples as tell motion from encoder noise, lest noise be taken for speed or a fast ramp be missed
+    while speed.size > 4 * reach and np.abs(x[2 * reach :] - x[: -2 * reach]).max() < 20.0 * noise:
+        reach *= 2
+        speed = _speed(t, x, reach)
     peak = int(np.argmax(speed))
     if speed[peak] <= 0:
         return None
@@ -175,3 +179,8 @@ def _fastest_motion(time_s: Array, position_mm: Array) -> tuple[float, float] | 
     first = int(before[-1]) + reach if before.size else 0
     last = int(after[0]) + reach if after.size else t.size - 1
     return float(t[first]), float(t[last])
+
+
+def _speed(t: Array, x: Array, reach: int) -> Array:
+    gap = t[2 * reach :] - t[: -2 * reach]
+    return np.abs(x[2 * reach :] - x[: -2 * reach]) / np.where(gap > 0, gap, np.inf)

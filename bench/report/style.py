@@ -76,21 +76,22 @@ h3{font-size:.95rem;margin:1.1rem 0 .35rem}
 p{margin:.35rem 0 .7rem}
 a{color:var(--commanded)}
 .sub{color:var(--muted);margin:0 0 1rem;overflow-wrap:anywhere}
+h1+section{margin-top:.8rem}
 section{background:var(--card);border:1px solid var(--edge);border-radius:10px;padding:1rem 1.1rem;margin:0 0 1rem}
 .verdict{border-left:6px solid var(--tone)}
 .verdict h2{color:var(--tone);font-size:1.3rem;line-height:1.3;margin-bottom:.3rem}
 .good{--tone:var(--good)}.fair{--tone:var(--fair)}.bad{--tone:var(--bad)}.plain{--tone:var(--muted)}
 .warn{color:var(--fair)}.fail{color:var(--bad);font-weight:600}.ok{color:var(--good)}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(130px,1fr));gap:.6rem;margin:.9rem 0 .1rem}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(136px,1fr));gap:.6rem;margin:.9rem 0 .1rem}
 .tile{border:1px solid var(--edge);border-radius:8px;padding:.5rem .7rem}
-.tile b{display:block;font-size:1.3rem;line-height:1.3;font-variant-numeric:tabular-nums;overflow-wrap:anywhere}
-.tile span{color:var(--muted);font-size:.82rem}
-nav{font-size:.88rem;margin:0 0 1rem}nav a{margin-right:1rem;white-space:nowrap}
+.tile b{display:block;font-size:1.14rem;line-height:1.3;font-variant-numeric:tabular-nums;overflow-wrap:anywhere}
+.tile span{color:var(--muted);font-size:.8rem;line-height:1.25;display:block}
+nav{font-size:.88rem;margin:0 0 1rem;display:flex;flex-wrap:wrap;gap:.2rem 1rem}
 figure{margin:.2rem 0 .4rem}
 figcaption{color:var(--muted);font-size:.86rem;margin-top:.3rem;max-width:72ch}
 .wide{overflow-x:auto}
 svg.plot{display:block;width:100%;height:auto}
-.wide svg.plot{min-width:640px}
+.wide svg.plot{min-width:720px}
 svg.plot *{stroke-linejoin:round;stroke-linecap:butt}
 svg.plot text{font-family:inherit!important;font-variant-numeric:tabular-nums}
 .pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,400px),1fr));gap:1rem}
@@ -99,10 +100,12 @@ table{border-collapse:collapse;font-size:.92rem;width:100%;font-variant-numeric:
 th,td{text-align:left;padding:.28rem .9rem .28rem 0;border-bottom:1px solid var(--grid);vertical-align:top}
 thead th{color:var(--muted);font-weight:600;font-size:.82rem;white-space:nowrap}
 tbody th{font-weight:600;white-space:nowrap}
+td:last-child:not(.n){min-width:10rem}
 td.n,th.n{text-align:right;white-space:nowrap}
 tr.chosen td,tr.chosen th{background:color-mix(in srgb,var(--noise) 14%,transparent)}
 tr.off td,tr.off th{color:var(--muted)}
-dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.1rem;margin:0;font-size:.94rem}
+dl{columns:2 340px;column-gap:2rem;margin:0 0 .5rem;font-size:.94rem}
+dl div{display:grid;grid-template-columns:8.5rem 1fr;gap:.8rem;padding:.16rem 0;break-inside:avoid}
 dt{color:var(--muted)}dd{margin:0;overflow-wrap:anywhere;white-space:pre-line}
 pre{overflow-x:auto;font-size:.82rem;line-height:1.4;background:var(--page);border:1px solid var(--edge);
  border-radius:8px;padding:.7rem}
@@ -110,8 +113,8 @@ code{font-size:.92em}
 summary{cursor:pointer;color:var(--commanded);margin:.3rem 0}
 ul{margin:.3rem 0;padding-left:1.2rem}li{margin:.2rem 0;overflow-wrap:anywhere}
 footer{color:var(--muted);font-size:.82rem}
-@media(max-width:560px){main{padding:.7rem .5rem 2rem}section{padding:.8rem .75rem}dl{grid-template-columns:1fr;gap:0}
- dd{margin-bottom:.45rem}h1{font-size:1.35rem}.verdict h2{font-size:1.12rem}}
+@media(max-width:560px){main{padding:.7rem .5rem 2rem}section{padding:.8rem .75rem}
+ dl div{grid-template-columns:6.5rem 1fr}h1{font-size:1.35rem}.verdict h2{font-size:1.12rem}}
 @media print{html,body{background:#fff}body{font-size:11px}main{max-width:none;padding:0}nav{display:none}
  section{border:none;padding:.2rem 0;break-inside:auto}.verdict{border-left:6px solid var(--tone);padding-left:.8rem}
  figure,table{break-inside:avoid}h2,h3{break-after:avoid}.wide,.scroll{overflow:visible}

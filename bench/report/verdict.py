@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from collections.abc import Mapping
@@ -75,10 +76,8 @@ def _given(record: Mapping[str, Any], *names: str) -> str:
     for name in names:
         value = str(record.get(name) or "").strip()
         if value.startswith('"'):
-            try:
+            with contextlib.suppress(ValueError):
                 value = str(json.loads(value))
-            except ValueError:
-                pass
         if value and value != "null":
             return value
     return ""
@@ -105,7 +104,8 @@ def fit_verdict(fit: FitView | None, problem: str) -> Verdict:
         return Verdict("plain", "No model was fitted", [problem] if problem else [])
     rmse, floor, percent = fit.number("rmse"), fit.number("noise_floor"), fit.number("fit_percent")
     ratio = rmse / floor if floor > 0 else math.nan
-    tone, judgement = _judge(ratio, percent)
+    tone, judgement = judge(fit)
+    judgement += f" ({percent:.1f} % fit)" if math.isfinite(percent) else ""
     sentences = [f"{structure(fit, capital=True)}. {_error_beside_noise(rmse, floor, ratio)}"]
     if fit.json.get("converged") is False:
         tone = "bad"
@@ -123,18 +123,20 @@ def fit_verdict(fit: FitView | None, problem: str) -> Verdict:
     return Verdict(tone, judgement, sentences)
 
 
-def _judge(ratio: float, percent: float) -> tuple[str, str]:
-    fitted = f" ({percent:.1f} % fit)" if math.isfinite(percent) else ""
+def judge(fit: FitView) -> tuple[str, str]:
+    """The model in one sentence, with its tone: by its error against the noise, and by the share it follows."""
+    rmse, floor, percent = fit.number("rmse"), fit.number("noise_floor"), fit.number("fit_percent")
+    ratio = rmse / floor if floor > 0 else math.nan
     if not math.isfinite(ratio):
-        return "plain", f"A model was fitted{fitted}"
+        return "plain", "A model was fitted"
     if ratio <= 1.15:
-        return "good", f"The model explains the force down to the noise{fitted}"
+        return "good", "The model explains the force down to the noise"
     if ratio <= 2.0:
-        return "good", f"The model is close to the noise{fitted}"
+        return "good", "The model is close to the noise"
     many = "several" if ratio < 10 else "many"
     if percent >= 95.0:
-        return "fair", f"The model follows the force, and leaves {many} times the noise unexplained{fitted}"
-    return "bad", f"The model does not explain these data{fitted}"
+        return "fair", f"The model follows the force, and leaves {many} times the noise unexplained"
+    return "bad", "The model does not explain these data"
 
 
 def _error_beside_noise(rmse: float, floor: float, ratio: float) -> str:

@@ -32,7 +32,7 @@ class Curve(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Rest:
     """Standing still at `end_mm`."""
 
@@ -146,7 +146,8 @@ class Axis:
         """Decelerate from the present commanded motion and stand."""
         now = self.clock.now()
         velocity = self.velocity(now)
-        self._curve = Braking(self.command(now), velocity, deceleration_mm_s2) if velocity else Rest(self.command(now))
+        here = self.command(now)
+        self._curve = Braking(here, velocity, deceleration_mm_s2) if velocity else Rest(here)
         self._start_s = now
         if self.motor.kind == "move":
             self.motor.link.drop_queue()

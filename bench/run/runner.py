@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
+from typing import Literal
 
 from bench.config import Bench
 from bench.errors import InputError, Stopped
@@ -81,7 +82,7 @@ def run_protocol(
     except PortError as error:
         raise InputError(bench.place((error.device, "port")), error.message) from error
     with rig:
-        mode = "inline" if rig.world is not None and rig.world.virtual else "process"
+        mode: Literal["inline", "process"] = "inline" if rig.world is not None and rig.world.virtual else "process"
         with Recorder(folder / RECORDING, rig.clock, mode=mode) as recorder:
             recorder.begin(
                 _run_record(protocol, bench, notes or Notes()),

@@ -1,16 +1,17 @@
 """Friction at the probe, felt by the load cell: ±F_c against the direction of motion.
 
-Force as a function of speed alone jumps at reversal and has no single value at rest, which no implicit step can solve and
-no real bearing shows. All forms therefore slide in over a short presliding distance: the force depends on the path
+Force as a function of speed alone jumps at reversal and has no single value at rest, which no implicit step can solve
+and no real bearing shows. All forms therefore slide in over a short presliding distance: the force depends on the path
 since the last reversal, rises with it, and is a continuous function of position.
 
 - `coulomb`: Prandtl's element, a spring F_c/presliding in series with a slider of F_c. Between reversals, beyond
   the presliding distance, it is exactly ±F_c at any speed.
 - `presliding`: Dahl's model, dF/dy = (F_c/d)(1 − sgn(v) F/F_c): the approach to F_c is gradual (P. R. Dahl, A solid
   friction model, Aerospace Corporation TOR-0158(3107-18)-1, 1968). Integrated exactly over a step.
-- `stribeck`: Prandtl's element whose slider holds F_c + (F_s − F_c) e^(−(v/v_s)^2) + viscous v: breaking away takes more
-  than sliding, and oil adds with speed (B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, A survey of models,
-  analysis tools and compensation methods for the control of machines with friction, Automatica 30, 1994, 1083-1138).
+- `stribeck`: Prandtl's element whose slider holds F_c + (F_s − F_c) e^(−(v/v_s)^2), with viscous · v beside it: to
+  break away takes more than to slide, and oil adds with speed (B. Armstrong-Hélouvry, P. Dupont, C. Canudas de Wit, A
+  survey of models, analysis tools and compensation methods for the control of machines with friction, Automatica 30,
+  1994, 1083–1138).
 
 State: last position, force, whether there was a position yet. A first position is rest without friction force.
 """
@@ -51,12 +52,15 @@ def dahl(dt: float, y: float, state: State, p: State) -> float:
 
 @block
 def stribeck(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element with a slider that depends on speed; p = (coulomb, static, stribeck_speed, viscous, presliding)."""
+    """Prandtl's element with a slider that depends on speed.
+
+    p = (coulomb, static_ratio, stribeck_speed, viscous, presliding).
+    """
     moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
     state[_STARTED] = 1.0
     state[_LAST] = y
     speed = abs(moved) / dt if dt > 0.0 else 0.0
-    limit = p[0] + (p[1] - p[0]) * math.exp(-((speed / p[2]) ** 2))
+    limit = p[0] * (1.0 + (p[1] - 1.0) * math.exp(-((speed / p[2]) ** 2)))
     force = state[_FORCE] + moved * (p[0] / p[4])
     force = max(-limit, min(limit, force))
     state[_FORCE] = force
@@ -83,8 +87,12 @@ EFFECT = Effect(
             what="more to break away than to slide, and a part that grows with speed",
             parameters=(
                 _COULOMB,
-                Parameter("static", "N", 0.0, 50.0, 0.08, "friction force near rest"),
-                Parameter("stribeck_speed", "mm/s", 1e-3, 1e3, 2.0, "speed at which the excess at rest has fallen to 1/e"),
+                Parameter(
+                    "static_ratio", "1", 1.0, 5.0, 1.6, "friction near rest over friction while sliding, F_s/F_c"
+                ),
+                Parameter(
+                    "stribeck_speed", "mm/s", 1e-3, 1e3, 2.0, "speed at which the excess at rest has fallen to 1/e"
+                ),
                 Parameter("viscous", "N*s/mm", 0.0, 10.0, 0.0, "further force per speed"),
                 _PRESLIDING,
             ),
@@ -96,7 +104,9 @@ EFFECT = Effect(
             what="gradual build-up after each reversal (Dahl)",
             parameters=(
                 _COULOMB,
-                Parameter("presliding", "mm", 1e-6, 5.0, 0.02, "distance over which friction builds up after a reversal"),
+                Parameter(
+                    "presliding", "mm", 1e-6, 5.0, 0.02, "distance over which friction builds up after a reversal"
+                ),
             ),
             blocks={"probe": dahl},
             state=(0.0, 0.0, 0.0),

@@ -68,7 +68,8 @@ class ElasticLaw(ABC):
         """F^e in N: the block that the plant runs, over an array."""
         delta = np.asarray(delta_mm, dtype=np.float64)
         out = np.empty(delta.size)
-        apply(self.block.address, as_vector((*self.kernel_parameters, 0.0)), as_vector(delta.ravel()), out)
+        parameters = as_vector((*self.kernel_parameters, 0.0))
+        apply(self.block.address, parameters, np.zeros(1), as_vector(delta.ravel()), out)
         return out.reshape(delta.shape)
 
     def stiffness(self, delta_mm: ArrayLike) -> Array:

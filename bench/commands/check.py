@@ -1,0 +1,55 @@
+"""`padbench check PROTOCOL`: is the protocol sound, and what will it do to the pad?"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from bench.commands.options import add_bench
+from bench.errors import EXIT_BAD_INPUT, EXIT_DONE
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("protocol", metavar="PROTOCOL", nargs="?", help="protocol file or shipped name")
+    add_bench(parser)
+    parser.add_argument(
+        "--plot", type=Path, metavar="HTML", help="write planned trajectory and expected force as a page"
+    )
+    parser.add_argument("--list", action="store_true", help="name the shipped protocols, benches and pads")
+
+
+def main(args: argparse.Namespace) -> int:
+    """Print the plan; status 1 where a limit would be crossed, 2 where the files contradict."""
+    if args.list:
+        return _list()
+    if args.protocol is None:
+        print("padbench check: which protocol? give a file or a shipped name (`padbench check --list`)")
+        return EXIT_BAD_INPUT
+    from bench.config import load_bench, load_model
+    from bench.preflight import check
+    from bench.protocol import load_protocol
+
+    protocol = load_protocol(args.protocol)
+    bench = load_bench(args.bench)
+    preflight = check(protocol, bench, load_model(args.pad) if args.pad else None)
+    for line in preflight.lines():
+        print(line)
+    if args.plot is not None:
+        from bench.planview import plan_view
+        from bench.report import write_plan
+
+        write_plan(args.plot, plan_view(preflight), title=f"Plan of {protocol.name}")
+        print(f"plot: {args.plot}")
+    refusal = preflight.refusal()
+    if refusal is not None:
+        raise refusal
+    return EXIT_DONE
+
+
+def _list() -> int:
+    from bench.shipped import shipped_names
+
+    for kind, title in (("protocol", "protocols"), ("bench", "benches"), ("pad", "pads")):
+        print(f"{title}: {', '.join(shipped_names(kind))}")
+    return EXIT_DONE

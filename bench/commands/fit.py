@@ -1,0 +1,76 @@
+"""`padbench fit DATA…`: the pad's model from recordings, run folders or CSV."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bench.commands.options import add_columns, add_structure, existing
+from bench.errors import EXIT_DONE
+
+if TYPE_CHECKING:
+    from bench.recording import Measurement
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument(
+        "data", nargs="+", type=Path, metavar="DATA", help="MCAP, run folder or CSV; several are one pad"
+    )
+    add_structure(parser)
+    add_columns(parser)
+    parser.add_argument("--json", metavar="OUT", help="write fit.json there; - for standard output, and nothing else")
+    parser.add_argument("--write", type=Path, metavar="MODEL", help="write the fitted model as YAML")
+    parser.add_argument("--report", type=Path, metavar="HTML", help="write a report page of the first DATA")
+
+
+def main(args: argparse.Namespace) -> int:
+    """Fit and print; status 0 whatever the verdict."""
+    from bench import identify
+    from bench.recording import parse_columns, parse_units, read_recording
+    from bench.results import fit_lines
+
+    columns = parse_columns(args.columns) if args.columns else None
+    units = parse_units(args.units) if args.units else None
+    recordings = [read_recording(existing(path), columns=columns, units=units) for path in args.data]
+    measurements: list[Measurement] = [recording.measurement() for recording in recordings]
+    with _status(quiet=args.json == "-") as progress:
+        result = identify.fit(
+            measurements,
+            method=args.method,
+            law=args.law,
+            order=args.order,
+            contact=args.contact,
+            degree=args.degree,
+            progress=progress,
+        )
+    text = json.dumps(result.to_json(), indent=2)
+    if args.json == "-":
+        print(text)
+    else:
+        print("\n".join([*(f"{m.name}: {note}" for m in measurements for note in m.notes), *fit_lines(result)]))
+        if args.json:
+            Path(args.json).write_text(text + "\n", "utf-8")
+    if args.write:
+        from bench.modelfile import write_model
+
+        write_model(args.write, result.model)
+    if args.report:
+        from bench.fitview import fit_view
+        from bench.report import write_report
+
+        write_report(args.report, recordings[0], fit_view(result))
+    return EXIT_DONE
+
+
+@contextmanager
+def _status(quiet: bool) -> Iterator[Callable[[str], None]]:
+    """Says on standard error what is being tried, while it takes long."""
+    from rich.console import Console
+
+    with Console(stderr=True, quiet=quiet).status("fitting") as status:
+        yield lambda text: status.update(f"fitting: {text}")

@@ -1,0 +1,68 @@
+"""`padbench simulate MODEL`: the force a model answers with, over a protocol or over measured motion."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bench.commands.options import add_columns, existing
+from bench.errors import EXIT_DONE
+
+if TYPE_CHECKING:
+    from sim.model import Model
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("model", metavar="MODEL", help="model file or shipped pad's name")
+    motion = parser.add_mutually_exclusive_group(required=True)
+    motion.add_argument("--protocol", metavar="P", help="the planned motion of a protocol")
+    motion.add_argument(
+        "--like", type=Path, metavar="DATA", help="the measured motion of a recording, run folder or CSV"
+    )
+    parser.add_argument("--bench", default="simulated", metavar="BENCH", help="with --protocol (default: %(default)s)")
+    add_columns(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="CSV", help="file to write")
+
+
+def main(args: argparse.Namespace) -> int:
+    """Simulate and write CSV; with --like, also say how far the simulation is from the data."""
+    from bench.config import load_model
+
+    model = load_model(args.model)
+    return _over_protocol(args, model) if args.protocol else _over_data(args, model)
+
+
+def _over_protocol(args: argparse.Namespace, model: Model) -> int:
+    from bench.config import load_bench
+    from bench.preflight import check
+    from bench.protocol import load_protocol
+    from bench.recording import write_csv
+
+    prediction = check(load_protocol(args.protocol), load_bench(args.bench), model).prediction
+    time_s = prediction.time_s
+    write_csv(args.out, time_s, prediction.position_mm, time_s, prediction.force_N)
+    print(f"wrote {args.out}: {time_s.size} samples over {time_s[-1]:.1f} s")
+    return EXIT_DONE
+
+
+def _over_data(args: argparse.Namespace, model: Model) -> int:
+    import numpy as np
+
+    from bench.recording import parse_columns, parse_units, read_recording, write_csv
+
+    columns = parse_columns(args.columns) if args.columns else None
+    units = parse_units(args.units) if args.units else None
+    measured = read_recording(existing(args.like), columns=columns, units=units).measurement()
+    t, x, force_t = measured.position_time_s, measured.position_mm, measured.force_time_s
+    force = model.simulate_at(t, x, force_t)
+    if force_t.size == t.size and not np.array_equal(force_t, t):
+        # Two clocks with a force for every position: row by row as the data have it.
+        write_csv(args.out, t, x, t, force, extra={"force_time_s": (t, force_t)})
+    else:
+        write_csv(args.out, t, x, force_t, force)
+    counted = (force_t >= measured.fit_from_s) & (force_t <= measured.fit_to_s)
+    error = np.sqrt(np.mean((measured.force_N - force)[counted] ** 2))
+    print(f"wrote {args.out}: {force.size} samples; RMS difference to the data {error:.6g} N")
+    return EXIT_DONE

@@ -1,0 +1,52 @@
+"""Prediction of time blocks that were left out of the fit."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import objective
+from .estimate import Estimate, polish
+from .problem import Problem
+
+BLOCKS, FOLDS = 20, 5
+
+
+def folds_of(problem: Problem) -> list[NDArray[np.intp]]:
+    """Of each run, the fold of every sample: contiguous blocks dealt out in turn.
+
+    A block is a twentieth of the data, half by samples and half by travel: else one block would hold a whole fast
+    ramp, and with it all that is known of the elastic response.
+    """
+    steps = []
+    for run in problem.runs:
+        travel = np.abs(np.diff(run.u, prepend=run.u[0]))
+        travel[travel < 2e-3] = 0.0  # jitter is no travel
+        steps.append((run.weight, travel))
+    weight = sum(float(w.sum()) for w, _ in steps)
+    way = sum(float(t.sum()) for _, t in steps) or 1.0
+    progress, out = 0.0, []
+    for w, t in steps:
+        along = progress + np.cumsum(w / weight / 2 + t / way / 2)
+        progress = float(along[-1])
+        out.append(np.minimum((along * BLOCKS).astype(np.intp), BLOCKS - 1) % FOLDS)
+    return out
+
+
+def held_out_square(short: Problem, full: Problem, owners: list[NDArray[np.intp]], estimate: Estimate) -> float:
+    """Mean squared error, in scaled force, of every sample as predicted by a fit that did not see its block.
+
+    Refits are made on `short`, errors taken on `full`; `owners`: of each run, the short sample of every full one.
+    """
+    folds = folds_of(short)
+    total = 0.0
+    for k in range(FOLDS):
+        kept = [np.where(f == k, 0.0, run.weight) for f, run in zip(folds, short.runs, strict=True)]
+        left = [
+            np.where(f[o] == k, run.weight, 0.0) for f, o, run in zip(folds, owners, full.runs, strict=True)
+        ]
+        if sum(float(w.sum()) for w in left) == 0 or sum(float(w.sum()) for w in kept) == 0:
+            continue
+        refit = polish(short.weighted(kept), estimate, max_steps=25, tolerance=1e-6)
+        total += objective.cost(full.weighted(left), estimate.structure, refit.x)
+    return total / full.weight

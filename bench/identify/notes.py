@@ -1,0 +1,155 @@
+"""Plain sentences about what the data can and cannot tell."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bench.recording.types import Measurement
+
+from ._kernel import Array
+from .estimate import Estimate
+from .motion import holds
+from .noise import Noise
+from .problem import Problem
+
+
+def about_data(problem: Problem, noise: Noise) -> list[str]:
+    """What is wrong or missing in the data themselves, whatever the model."""
+    out = list(problem.notes)
+    several = len(problem.measurements) > 1
+    for m in problem.measurements:
+        found = [*m.notes, *_about(m, noise)]
+        out += [f"{m.name}: {line}" for line in found] if several else found
+    speeds = np.concatenate([_move_speeds(m, problem.depth_mm) for m in problem.measurements])
+    if len(speeds) and speeds.max() < 1.5 * speeds.min():
+        out.append(f"All moves are at one speed ({np.median(speeds):.3g} mm/s): what other speeds do rests on the model.")
+    if not noise.from_holds:
+        out.append("There is no hold: the noise was judged from the motion, and slow modes are told from drift by the model alone.")
+    if problem.depth_mm < 10 * noise.position_mm:
+        out.append("The depth is less than ten times the noise of the position: the elastic law cannot be told.")
+    return out
+
+
+def _about(m: Measurement, noise: Noise) -> list[str]:
+    out = []
+    force, depth = m.force_N, np.interp(m.force_time_s, m.position_time_s, m.position_mm)
+    top = float(np.abs(force).max())
+    deepest = depth > 0.7 * depth.max()
+    if float(np.mean(force[deepest])) < -3 * noise.force_N:
+        out.append("The force is negative at depth: its sign is reversed (load cell `sign: -1`), or this is no pad pressed in.")
+    elif top < 10 * noise.force_N:
+        out.append(f"The force ({top:.3g} N at most) is less than ten times its noise.")
+    level = _cap(force)
+    if level is not None:
+        out.append(f"The force stands at {level:.4g} N again and again, with nothing above: the channel is saturated there.")
+    out += _level_notes(m, depth, noise, top)
+    if deepest.any() and float(depth.max()) > 0:
+        rising = np.flatnonzero(np.abs(force - _first_level(force)) > max(8 * noise.force_N, 0.01 * top))
+        start = depth[rising[0]] / depth.max() if len(rising) else 0.0
+        if start > 0.3:
+            out.append(
+                f"The force rises only from {depth[rising[0]]:.4g} mm on: the surface may not be at 0 mm, where the model has it."
+            )
+    return out
+
+
+def _first_level(force: Array) -> float:
+    return float(np.mean(force[: max(3, min(20, len(force) // 50))]))
+
+
+def _level_notes(m: Measurement, depth: Array, noise: Noise, top: float) -> list[str]:
+    count = max(3, min(20, len(depth) // 50))
+    start, begun = _first_level(m.force_N), float(np.mean(depth[:count]))
+    large = max(6 * noise.force_N, 0.01 * top)
+    if begun > 0.02 * depth.max() and abs(start) > large:
+        return [
+            f"The data begin at {begun:.3g} mm with {start:.3g} N on the pad: the model starts from rest there, its past is not known."
+        ]
+    out = []
+    air = depth < -0.002 * np.ptp(depth)
+    if int(air.sum()) >= 10:
+        level = float(np.mean(m.force_N[air]))
+        edge = max(int(air.sum()) // 5, 1)
+        change = float(np.mean(m.force_N[air][-edge:]) - np.mean(m.force_N[air][:edge]))
+        if abs(level) > max(noise.force_N, 0.003 * top) or abs(change) > max(noise.force_N, 0.003 * top):
+            out.append(f"In air the force reads {level:.3g} N and changes by {change:+.3g} N over the run: tare or drift.")
+    elif abs(start) > large:
+        out.append(f"The force is {start:.3g} N before the probe has gone in: an offset or a preload, which the model has not.")
+    return out
+
+
+def _cap(force: Array) -> float | None:
+    """The level of saturation: a long run exactly at the largest magnitude, where runs elsewhere are short."""
+    top = float(np.abs(force).max())
+    if top == 0:
+        return None
+    edges = np.flatnonzero(np.diff(force) != 0) + 1
+    bounds = np.concatenate([[0], edges, [len(force)]])
+    lengths, levels = np.diff(bounds), force[bounds[:-1]]
+    at_top = np.abs(levels) >= top * (1 - 1e-12)
+    longest = int(lengths[at_top].max())
+    elsewhere = lengths[~at_top]
+    usual = float(np.quantile(elsewhere, 0.99)) if len(elsewhere) else 1.0
+    return float(levels[at_top][0]) if longest >= max(10, 5 * usual) else None
+
+
+def _move_speeds(m: Measurement, depth_mm: float) -> Array:
+    """Mean speeds of the moves between holds and turning points that go a tenth of the depth or more, mm/s."""
+    still = holds(m.position_time_s, m.position_mm)
+    edges = [0, *(e for s in still for e in (s.start, s.stop - 1)), len(m.position_mm) - 1]
+    out = []
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        if b - a < 1:
+            continue
+        x, t = m.position_mm[a : b + 1], m.position_time_s[a : b + 1]
+        turns = _turns(x, 0.1 * depth_mm)
+        for i, j in zip(turns[:-1], turns[1:], strict=True):
+            if abs(x[j] - x[i]) >= 0.1 * depth_mm and t[j] > t[i]:
+                # Middle half of the way: ends are acceleration, or a hold's first samples.
+                low, high = sorted((x[i] + 0.25 * (x[j] - x[i]), x[i] + 0.75 * (x[j] - x[i])))
+                inside = np.flatnonzero((x[i : j + 1] >= low) & (x[i : j + 1] <= high)) + i
+                p, q = (inside[0], inside[-1]) if len(inside) > 1 else (i, j)
+                if t[q] > t[p]:
+                    out.append(abs(x[q] - x[p]) / (t[q] - t[p]))
+    return np.array(out)
+
+
+def _turns(x: Array, least: float) -> list[int]:
+    """First, last and turning samples, small wiggles left out."""
+    out, best, way = [0], 0, 0
+    for k in range(len(x)):
+        if way == 0 and abs(x[k] - x[0]) >= least:
+            way, best = (1 if x[k] > x[0] else -1), k
+        elif way and way * (x[k] - x[best]) > 0:
+            best = k
+        elif way and way * (x[best] - x[k]) >= least:
+            out.append(best)
+            way, best = -way, k
+    out.append(len(x) - 1)
+    return out
+
+
+def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
+    """What the fit found at the edge of what the data can tell, and the range it was measured over."""
+    out = []
+    _, rates, weights = estimate.structure.split(estimate.x)
+    step, span = problem.times()
+    if weights.sum() <= 0:
+        out.append("No positive stiffness fits these data: every parameter is lost.")
+        return out
+    slow = [1 / nu for nu, a in zip(rates, weights[1:], strict=True) if a > 0 and 1 / nu > 0.5 * span]
+    if slow:
+        out.append(
+            f"The slowest mode ({max(slow):.3g} s) is longer than half the run ({span:.3g} s): how far the force goes on"
+            " falling is not known."
+        )
+    fast = [1 / nu for nu, a in zip(rates, weights[1:], strict=True) if a > 0 and 1 / nu < 3 * step]
+    if fast:
+        out.append(f"The fastest mode ({min(fast):.2g} s) is hardly longer than a sample ({step:.2g} s).")
+    if not estimate.converged:
+        out.append("The search did not converge.")
+    out.append(
+        f"Measured: times from {2 * step:.2g} s to {span:.3g} s, depths to {problem.depth_mm:.4g} mm. Beyond that the model"
+        " was not tried."
+    )
+    return out

@@ -1,0 +1,183 @@
+"""Which law, which order, which contact: the candidates, the evidence, the choice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import objective
+from .condense import condensed
+from .estimate import Estimate, polish, search
+from .held_out import held_out_square
+from .laws import Family
+from .objective import Structure
+from .problem import Problem
+from .starts import Bounds, Starter, bounds_of
+from .uncertainty import independent_samples
+
+CONTENDERS = 6  # candidates polished on all the data
+CLEAR = 6.0  # difference of the criterion that decides (some 20 to 1 in odds)
+RESOLVED = 1e-5  # of the largest force: no force channel is better, no difference of errors below it means anything
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A fitted structure with its evidence; V and `held_out_square` in scaled force squared."""
+
+    estimate: Estimate
+    V: float
+    held_out_square: float = float("nan")
+    criterion: float = float("nan")
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return self.estimate.structure.size
+
+    @property
+    def eligible(self) -> bool:
+        """Whether it may be chosen: physical, every mode distinct, the search ended."""
+        return self.estimate.physical and self.estimate.distinct and self.estimate.converged
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The candidate chosen, polished on all the data, and everything it was compared with."""
+
+    best: Candidate
+    candidates: list[Candidate]
+    independent: float
+
+
+def choose(
+    problem: Problem,
+    families: Sequence[Family],
+    orders: Sequence[int],
+    contacts: Sequence[bool],
+    progress: Callable[[str], None],
+) -> Choice:
+    """Fit every structure asked for and choose.
+
+    The criterion is n_e ln V + P ln n_e; n_e is the number of independent samples that the residual of the
+    candidate with the least V is worth, so that coloured residuals do not buy modes. The lowest wins, unless a
+    simpler one is within `CLEAR` of it and predicts left-out blocks as well, or predicts them 5 % better at all.
+    Contact is chosen first, by the lowest criterion; where the pad never lets go in the simulation the two are one
+    model, and `unilateral` is what it is called.
+    """
+    short, owners = condensed(problem)
+    bounds = bounds_of(problem)
+    ladders = {True: [Ladder(short, f, True, bounds) for f in families] if True in contacts else [],
+               False: [Ladder(short, f, False, bounds) for f in families] if False in contacts else []}  # fmt: skip
+    first = min(max(min(orders), 2), max(orders))
+    for unilateral in contacts:
+        if not unilateral and True in contacts and not _lets_go(short, ladders[True]):
+            continue  # the two contacts are one model
+        for ladder in ladders[unilateral]:
+            progress(f"{ladder.name}, {'unilateral' if unilateral else 'bonded'}, order 1 to {first}")
+            ladder.climb(first)
+    for ladder in _worth_climbing(ladders):
+        if max(orders) > first:
+            progress(f"{ladder.name}, order {first + 1} to {max(orders)}")
+        ladder.climb(max(orders))
+    estimates = [e for side in ladders.values() for ladder in side for e in ladder.found if e.structure.order in orders]
+    inside = _scatter_within(problem, short, owners)
+    candidates = [Candidate(e, (e.cost + inside) / problem.weight) for e in estimates]
+    lowest = min(candidates, key=lambda c: c.V)
+    refined = polish(problem, lowest.estimate, max_steps=10)
+    independent = independent_samples(problem, refined.x, refined.structure)
+    candidates = [_judged(c, independent) for c in candidates]
+    ranked = sorted(candidates, key=lambda c: (not c.eligible, c.criterion))
+    judged = []
+    for rank, c in enumerate(ranked):
+        if rank < CONTENDERS:
+            progress(f"comparing {c.estimate.structure.family.name}, order {c.estimate.structure.order}")
+            judged.append(_finished(c, problem, short, owners, independent))
+        else:  # far behind: the short data tell enough
+            held = held_out_square(short, short, [np.arange(r.size) for r in short.runs], c.estimate)
+            judged.append(replace(c, held_out_square=held + inside / problem.weight))
+    best = _pick(judged)
+    if all(best is not c for c in judged[:CONTENDERS]):
+        better = _finished(best, problem, short, owners, independent)
+        judged = [better if c is best else c for c in judged]
+        best = better
+    return Choice(best, judged, independent)
+
+
+def _finished(
+    c: Candidate, problem: Problem, short: Problem, owners: list[NDArray[np.intp]], independent: float
+) -> Candidate:
+    """Polished on all the data, its held-out error taken on all of them."""
+    e = polish(problem, c.estimate)
+    held = held_out_square(short, problem, owners, e)
+    return _judged(Candidate(e, e.cost / problem.weight, held), independent)
+
+
+class Ladder:
+    """Fits of one law and contact, of rising order: each starts from the grid and from the one below, so that V does
+    not rise with the order."""
+
+    def __init__(self, problem: Problem, family: Family, unilateral: bool, bounds: Bounds) -> None:
+        self.problem, self.family, self.unilateral, self.bounds = problem, family, unilateral, bounds
+        self.name = f"{family.name} {family.degree or ''}".strip()
+        self.found: list[Estimate] = []
+        self._starter = Starter(problem, family, unilateral, bounds)
+
+    def climb(self, order: int) -> None:
+        """Fit up to `order`."""
+        while len(self.found) < order:
+            r = len(self.found) + 1
+            starts = self._starter.first(r)
+            if self.found:
+                starts += self._starter.next(self.found[-1].structure, self.found[-1].x)
+            self.found.append(search(self.problem, Structure(self.family, r, self.unilateral), starts, self.bounds))
+
+
+def _worth_climbing(ladders: dict[bool, list[Ladder]]) -> list[Ladder]:
+    """Those of the contact that fits better so far; of both where they are close."""
+    least = {side: min((e.cost for one in many for e in one.found), default=np.inf) for side, many in ladders.items()}
+    return [one for side, many in ladders.items() for one in many if least[side] <= 1.1 * min(least.values())]
+
+
+def _lets_go(problem: Problem, ladders: list[Ladder]) -> bool:
+    return any(
+        bool(gone.any())
+        for one in ladders
+        for e in one.found
+        for _, gone, _ in objective.forces(problem, e.structure, e.x)
+    )
+
+
+def _scatter_within(full: Problem, short: Problem, owners: list[NDArray[np.intp]]) -> float:
+    """Σ w (y − block mean)²: what the short data do not show, the same for every model."""
+    total = 0.0
+    for run, block, owner in zip(full.runs, short.runs, owners, strict=True):
+        total += float(np.sum(run.weight * (run.y - block.y[owner]) ** 2))
+    return total
+
+
+def _judged(c: Candidate, independent: float) -> Candidate:
+    V = c.V + RESOLVED**2  # the scaled force is 1 at most
+    return replace(c, criterion=independent * float(np.log(V)) + c.size * float(np.log(independent)))
+
+
+def _pick(candidates: list[Candidate]) -> Candidate:
+    able = [c for c in candidates if c.eligible] or candidates
+    able = sorted(able, key=lambda c: c.criterion)
+    # The contact whose best is best; a tie goes to the pad that can let go.
+    for c in able:
+        if c.estimate.structure.unilateral and c.criterion < able[0].criterion + 2.0:
+            able = [a for a in able if a.estimate.structure.unilateral]
+            break
+    else:
+        able = [a for a in able if not a.estimate.structure.unilateral]
+    best = able[0]
+    for c in sorted(able[1:], key=lambda c: c.size):
+        if c.size >= best.size:
+            continue
+        as_well = c.held_out_square <= best.held_out_square and c.criterion < best.criterion + CLEAR
+        if as_well or 1.1 * c.held_out_square < best.held_out_square:
+            return c
+    return best

@@ -1,0 +1,255 @@
+"""Before anything moves: what the protocol will do on this bench to the pad as it is believed to be.
+
+Two kinds of refusal. A contradiction can be read off the files (a speed beyond the bench's limit) and is the files'
+fault; a prediction takes the pad model (a force beyond the limit) and is an answer: no.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.config import Bench
+from bench.errors import InputError, PadbenchError, Refused
+from bench.places import Key
+from bench.plan import Plan, Problem, Segment, plan
+from bench.predict import Prediction, predict
+from bench.protocol import Approach, Protocol
+from bench.rates import force_rate_Hz, motor_rate_Hz
+
+if TYPE_CHECKING:
+    from sim.model import Model
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-9
+TARE_S = 2.0
+"""Taken for the tare in air when bench time is estimated."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What is expected of one segment: extremes of position (mm) and of force (N; NaN without a pad model)."""
+
+    segment: Segment
+    start_s: float
+    duration_s: float
+    deepest_mm: float
+    highest_mm: float
+    peak_N: float
+    least_N: float
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """What `check` found. `duration_s` counts from the end of the touch-off, `approach_s` is what tare, approach and
+    the way back may take at most. `surface_mm` is the range of motor-frame heights of the surface for which the
+    protocol stays within the travel; None in an air run."""
+
+    protocol: Protocol
+    plan: Plan
+    prediction: Prediction
+    problems: tuple[Problem, ...]
+    outcomes: tuple[Outcome, ...]
+    duration_s: float
+    approach_s: float
+    samples: dict[str, int]
+    surface_mm: tuple[float, float] | None
+    believed: bool
+
+    @property
+    def errors(self) -> tuple[Problem, ...]:
+        """What refuses the run."""
+        return tuple(p for p in self.problems if p.severity == "error")
+
+    @property
+    def notices(self) -> tuple[Problem, ...]:
+        """What is only said."""
+        return tuple(p for p in self.problems if p.severity == "notice")
+
+    @property
+    def ok(self) -> bool:
+        """Nothing stands against the run."""
+        return not self.errors
+
+    def refusal(self) -> PadbenchError | None:
+        """The errors as one exception: `InputError` where the files contradict, else `Refused`; None if all is well."""
+        errors = sorted(self.errors, key=lambda p: p.kind != "contradiction")
+        if not errors:
+            return None
+        first, others = errors[0], errors[1:]
+        cure = "\n  ".join([line for line in (first.cure,) if line] + [f"also: {problem}" for problem in others[:5]])
+        if first.kind == "contradiction":
+            return InputError(self.protocol.place(first.path), str(first), cure)
+        return Refused(f"{first}" + (f"\n  {cure}" if cure else ""))
+
+    def lines(self, width: int = 100) -> list[str]:
+        """The summary for a terminal, without colour."""
+        from bench.preflight_text import render
+
+        return render(self, width)
+
+
+def check(
+    protocol: Protocol,
+    bench: Bench,
+    believed: Model | None = None,
+    *,
+    surface_mm: float | None = None,
+    latency_s: float | None = None,
+    noise_N: float = 0.0,
+) -> Preflight:
+    """Plan the protocol, simulate it on the believed pad, and say what stands against it.
+
+    `surface_mm` (motor frame) is the surface once it is known: travel is then checked exactly, before only its span.
+    `latency_s` and `noise_N` as for `bench.plan.plan`.
+    """
+    if protocol.in_air:
+        believed = None  # there is nothing for it to be
+    planned = plan(protocol, bench, believed, latency_s=latency_s, noise_N=noise_N)
+    prediction = predict(planned, believed)
+    outcomes = _outcomes(prediction)
+    problems = list(planned.problems)
+    problems += _travel(planned, outcomes, surface_mm)
+    problems += _depth(planned, prediction, outcomes)
+    if believed is None and not planned.in_air:
+        cure = "give the pad's model with --pad; for a pad that has none yet, begin with `first_contact`"
+        problems.append(Problem("", "no pad model: forces are not predicted", "notice", cure=cure))
+    elif believed is not None:
+        problems += _forces(planned, outcomes)
+    if bench.motor.orientation == "vertical" and bench.motor.safe_state == "release":
+        message = "a vertical axis is let go in the safe state (motor.safe_state: release) and falls on the sample"
+        problems.append(Problem("", message, "notice", cure="use hold or retract, unless a brake or spring carries it"))
+    duration_s = float(prediction.time_s[-1])
+    approach_s = _approach_s(protocol, bench)
+    total_s = duration_s + approach_s
+    return Preflight(
+        protocol=protocol,
+        plan=planned,
+        prediction=prediction,
+        problems=tuple(problems),
+        outcomes=outcomes,
+        duration_s=duration_s,
+        approach_s=approach_s,
+        samples={
+            "motor": round(total_s * motor_rate_Hz(bench, protocol.sampling.motor)),
+            "load_cell": round(total_s * force_rate_Hz(bench, protocol.sampling.load_cell)),
+        },
+        surface_mm=None if planned.in_air else _surface_range(planned, outcomes),
+        believed=believed is not None,
+    )
+
+
+def _approach_s(protocol: Protocol, bench: Bench) -> float:
+    lowest, highest = bench.limits.position
+    if not isinstance(protocol.approach, Approach):
+        return TARE_S
+    return TARE_S + (highest - lowest + protocol.approach.retract) / protocol.approach.speed
+
+
+def _outcomes(prediction: Prediction) -> tuple[Outcome, ...]:
+    ends = np.searchsorted(prediction.segment, np.arange(len(prediction.segments)), side="right")
+    begins = np.concatenate([[0], ends[:-1]])
+    found = []
+    for index, segment in enumerate(prediction.segments):
+        start_s = float(prediction.starts_s[index])
+        # A segment begins where the one before ended: that sample belongs to both.
+        rows = slice(max(begins[index] - 1, 0), ends[index])
+        position, force, time = prediction.position_mm[rows], prediction.force_N[rows], prediction.time_s[rows]
+        found.append(
+            Outcome(
+                segment=segment,
+                start_s=start_s,
+                duration_s=float(time[-1]) - start_s,
+                deepest_mm=float(position.max()),
+                highest_mm=float(position.min()),
+                # but its force is what the segment before has done
+                peak_N=float(force[1:].max()) if force.size > 1 else float(force[0]),
+                least_N=float(force[1:].min()) if force.size > 1 else float(force[0]),
+            )
+        )
+    return tuple(found)
+
+
+def _worst(outcomes: Iterable[Outcome], key: Callable[[Outcome], float]) -> list[Outcome]:
+    """The one with the greatest key of each step, however often a block repeats it."""
+    worst: dict[tuple[Key, ...], Outcome] = {}
+    for outcome in outcomes:
+        path = outcome.segment.path
+        if path not in worst or key(outcome) > key(worst[path]):
+            worst[path] = outcome
+    return list(worst.values())
+
+
+def _forces(planned: Plan, outcomes: tuple[Outcome, ...]) -> Iterator[Problem]:
+    limits = planned.limits
+    for outcome in _worst((o for o in outcomes if o.peak_N > limits.force_N + TOLERANCE), lambda o: o.peak_N):
+        segment = outcome.segment
+        yield Problem(
+            segment.name,
+            f"{outcome.peak_N:.3g} N are expected at {outcome.deepest_mm:.3g} mm, beyond limits.force {limits.force_N:g} N",
+            kind="prediction",
+            cure="go less deep, or slower; raise the limit only if bench and sample stand it",
+            path=segment.path,
+        )
+    for outcome in _worst((o for o in outcomes if o.least_N < -limits.tension_N - TOLERANCE), lambda o: -o.least_N):
+        yield Problem(
+            outcome.segment.name,
+            f"a pull of {-outcome.least_N:.3g} N is expected, beyond limits.tension {limits.tension_N:g} N",
+            kind="prediction",
+            cure="come back slower, or less far",
+            path=outcome.segment.path,
+        )
+
+
+def _depth(planned: Plan, prediction: Prediction, outcomes: tuple[Outcome, ...]) -> Iterator[Problem]:
+    for index in prediction.unreached:
+        outcome = outcomes[index]
+        segment = outcome.segment
+        if segment.kind == "force_hold":
+            what = f"holding {segment.target_N:g} N is expected to creep to {outcome.deepest_mm:.3g} mm, all that is allowed"
+        else:
+            what = (
+                f"{segment.target_N:g} N are not expected before {outcome.deepest_mm:.3g} mm, all that is allowed: "
+                f"only {outcome.peak_N:.3g} N there"
+            )
+        cure = "lower the target, or raise limits.depth"
+        yield Problem(segment.name, what, kind="prediction", cure=cure, path=segment.path)
+    if planned.in_air or prediction.bounded:
+        return
+    deep = (o for o in outcomes if o.deepest_mm > planned.limits.depth_mm + TOLERANCE)
+    for outcome in _worst(deep, lambda o: o.deepest_mm):
+        message = f"{outcome.deepest_mm:.3g} mm are expected, beyond limits.depth {planned.limits.depth_mm:g} mm"
+        cure = "lower the target or the speed, or raise limits.depth"
+        yield Problem(outcome.segment.name, message, kind="prediction", cure=cure, path=outcome.segment.path)
+
+
+def _travel(planned: Plan, outcomes: tuple[Outcome, ...], surface_mm: float | None) -> Iterator[Problem]:
+    """Positions against the bench's travel; without a surface, whether any height of it would do."""
+    lowest, highest = planned.limits.position_mm
+    deepest, least = max(outcomes, key=lambda o: o.deepest_mm), min(outcomes, key=lambda o: o.highest_mm)
+    zero = 0.0 if planned.in_air else surface_mm
+    text = f"limits.position [{lowest:g}, {highest:g}]"
+    if zero is None:
+        way = deepest.deepest_mm - least.highest_mm
+        if way > highest - lowest + TOLERANCE:
+            name, path = deepest.segment.name, deepest.segment.path
+            message = f"from {least.highest_mm:.3g} to {deepest.deepest_mm:.3g} mm is more than the bench's {text} has"
+            yield Problem(name, message, cure="go less deep", path=path)
+        return
+    kind: Literal["contradiction", "prediction"] = "contradiction" if planned.in_air else "prediction"
+    where = "" if planned.in_air else f" (surface at {zero:.4g} mm)"
+    for outcome, at in ((deepest, zero + deepest.deepest_mm), (least, zero + least.highest_mm)):
+        if not lowest - TOLERANCE <= at <= highest + TOLERANCE:
+            message = f"goes to {at:.4g} mm in the motor frame{where}, beyond the bench's {text}"
+            cure = "stay within it" if planned.in_air else "move the sample, or go less far"
+            yield Problem(outcome.segment.name, message, kind=kind, cure=cure, path=outcome.segment.path)
+
+
+def _surface_range(planned: Plan, outcomes: tuple[Outcome, ...]) -> tuple[float, float]:
+    lowest, highest = planned.limits.position_mm
+    return lowest - min(o.highest_mm for o in outcomes), highest - max(o.deepest_mm for o in outcomes)

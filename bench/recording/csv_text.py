@@ -1,0 +1,151 @@
+"""A CSV file as text cells: encoding, separator, header, rows of equal length."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.errors import InputError
+
+_SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
+
+
+@dataclass
+class Table:
+    """Header and rows; `lines[i]` is the line in the file on which row i ends (from 1)."""
+
+    path: Path
+    header: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    separator: str
+    decimal_comma: bool
+    notes: list[str]
+
+    def place(self, row: int, column: int | None = None) -> str:
+        """`file:line[:column]` of a row or of a cell, for messages."""
+        if column is None:
+            return f"{self.path}:{self.lines[row]}"
+        at = 1 + sum(len(cell) + 1 for cell in self.rows[row][:column])
+        return f"{self.path}:{self.lines[row]}:{at}"
+
+
+def read_table(path: Path) -> Table:
+    """Read a CSV file with a header line. Separators are found out; lines that begin with `#` are comments.
+
+    Raises `InputError` that names the place: empty file, no header, no data, rows of another length, decimal commas
+    between comma separators, bytes that are no text.
+    """
+    notes: list[str] = []
+    text = _decode(path, notes)
+    first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), None)
+    if first is None:
+        raise InputError(str(path), "is empty", _WANTED)
+    separator = max(_SEPARATORS, key=first.count)
+    if first.count(separator) == 0:
+        separator = ","
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, strict=True)
+    header: list[str] | None = None
+    rows: list[list[str]] = []
+    lines: list[int] = []
+    try:
+        for row in reader:
+            if not row or (len(row) == 1 and not row[0].strip()) or row[0].startswith("#"):
+                continue
+            if header is None:
+                header = [cell.strip() for cell in row]
+                _check_header(header, path, reader.line_num)
+            else:
+                rows.append(row)
+                lines.append(reader.line_num)
+    except csv.Error as error:
+        raise InputError(f"{path}:{reader.line_num}", f"is not CSV: {error}", _WANTED) from None
+    assert header is not None
+    decimal_comma = separator != "," and _uses_decimal_comma(rows)
+    if separator != ",":
+        notes.append(f"{_SEPARATORS[separator]} taken as separator")
+    if decimal_comma:
+        notes.append("decimal commas taken as decimal points")
+    table = Table(path, header, rows, lines, separator, decimal_comma, notes)
+    _check_lengths(table)
+    if len(rows) < 2:
+        count = "no row" if not rows else "a single row"
+        raise InputError(str(path), f"has a header and {count} of data", "two samples at the least are needed")
+    return table
+
+
+_WANTED = "wanted: a header line time_s,position_mm,force_N and one line a sample"
+
+
+def _decode(path: Path, notes: list[str]) -> str:
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read ({error.strerror})") from None
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        notes.append("read as UTF-16")
+        encoding = "utf-16"
+    else:
+        encoding = "utf-8-sig"
+        if b"\0" in data[:65536]:
+            raise InputError(str(path), "is neither a recording nor text", _WANTED)
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        pass
+    try:
+        text = data.decode("cp1252")
+    except UnicodeDecodeError:
+        raise InputError(str(path), "is neither a recording nor text", _WANTED) from None
+    notes.append("read as Windows text (cp1252), since it is not UTF-8")
+    return text
+
+
+def _check_header(header: Sequence[str], path: Path, line: int) -> None:
+    place = f"{path}:{line}"
+    if any(_is_number(cell) for cell in header):
+        raise InputError(place, "the first line holds numbers where the columns' names should stand", _WANTED)
+    for i, name in enumerate(header):
+        if name and name in header[:i]:
+            raise InputError(place, f"two columns are called {name!r}", "rename one of them")
+
+
+def _check_lengths(table: Table) -> None:
+    width = len(table.header)
+    for i, row in enumerate(table.rows):
+        if len(row) == width:
+            continue
+        message = f"{len(row)} cells where the header has {width}"
+        cure = ""
+        if table.separator == "," and len(row) > width and _comma_decimals(row):
+            cure = "are those decimal commas? export with decimal points, or with semicolons as separators"
+        elif table.separator != "," and len(row) == 1 and "," in row[0]:
+            cure = f"the header is separated by {_SEPARATORS[table.separator]}s, this line is not"
+        elif i == len(table.rows) - 1:
+            cure = "the last line is not complete: was the file cut off? remove the line"
+        raise InputError(table.place(i), message, cure)
+
+
+def _comma_decimals(row: Sequence[str]) -> bool:
+    """Whether a row looks like numbers that were torn apart at their decimal commas."""
+    return all(cell.strip().lstrip("+-").isdecimal() for cell in row if cell.strip())
+
+
+def _uses_decimal_comma(rows: Sequence[Sequence[str]]) -> bool:
+    for row in rows[:1000]:
+        for cell in row:
+            if "," in cell and _is_number(cell.replace(",", ".", 1)) and "." not in cell:
+                return True
+    return False
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return cell.strip().lower().lstrip("+-") not in ("nan", "inf", "infinity")

@@ -1,0 +1,200 @@
+"""From a recording to the arrays that a fit may see: the rules, in one place.
+
+What was measured is not changed: positions move into the pad frame, stamps by the delays that `doctor` measured, and
+samples that cannot count are left out and named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench import yamlfile
+from bench.errors import InputError
+from bench.recording.schemas import BENCH_FILE, NO_SURFACE, STOPPED
+from bench.recording.types import Array, Measurement, Recording
+
+GAP = 5.0
+"""A pause between samples of more than so many usual periods is reported."""
+
+SPIKE = 30.0
+"""A sample is reported as a drop-out when it stands so many noise deviations away from both its neighbours …"""
+
+SPIKE_OVER_STEPS = 5.0
+"""… and so many times further than the neighbours moved themselves (the tip of a triangle is none)."""
+
+MERGED_TIMES = "samples with a stamp that was there already were averaged"
+
+
+@dataclass(frozen=True)
+class Delays:
+    """How late the reported stamps are, seconds, by the bench file's `timing`; subtracted from them."""
+
+    force_s: float = 0.0
+    position_s: float = 0.0
+
+
+def measurement_of(recording: Recording) -> Measurement:
+    """The measurement in a recording.
+
+    Position in the pad frame and net force, each at its own strictly increasing times, corrected by the `timing` of
+    the bench file in the recording. Force samples that the device called bad (overload) and those outside the
+    position's time span are left out. `fit_from_s` is the start of the first mark of phase `steps`; before it all is
+    history. `fit_to_s` is where the run was stopped, if it was. Without marks (CSV) everything counts.
+    Raises `InputError` where there is no surface, no sample, or the run ended before its first step.
+    """
+    place = str(recording.source)
+    cure = f"what could be read: {recording.lost}" if recording.lost else ""
+    if recording.motor.time_s.size == 0 or recording.load_cell.time_s.size == 0:
+        what = "position" if recording.motor.time_s.size == 0 else "force"
+        raise InputError(place, f"holds no {what} sample", cure)
+    if recording.surface_mm is None:
+        raise InputError(place, "has no touch-off: where the pad begins is not known", cure or "did the run reach it?")
+    notes = list(recording.notes)
+    delays = delays_of(recording)
+    if delays != Delays():
+        notes.append(
+            f"stamps corrected by the bench's timing: force {delays.force_s * 1e3:g} ms, "
+            f"position {delays.position_s * 1e3:g} ms"
+        )
+    if any(event.name == NO_SURFACE for event in recording.events):
+        notes.append("run without touch-off: depths count from the motor's own zero")
+    position_time, position = _channel(
+        "position", recording.motor.time_s - delays.position_s, recording.motor.position_mm, notes
+    )
+    force_time, force = _forces(recording, delays, notes)
+    if position.size < 2:
+        raise InputError(place, "holds fewer than two position samples", cure)
+    inside = (force_time >= position_time[0]) & (force_time <= position_time[-1])
+    outside = int(force_time.size - inside.sum())
+    if outside:
+        notes.append(f"{outside} force samples outside the time of the position samples left out")
+    force_time, force = force_time[inside], force[inside]
+    fit_from, fit_to = _span(recording, place)
+    counted = int(np.count_nonzero((force_time >= fit_from) & (force_time <= fit_to)))
+    if counted < 2:
+        raise InputError(place, f"holds {counted} force samples that count, two at the least are needed", cure)
+    _report_gaps("position", position_time, notes)
+    _report_gaps("force", force_time, notes)
+    _report_spikes("position", position_time, position, notes)
+    _report_spikes("force", force_time, force, notes)
+    return Measurement(
+        name=_name(recording.source),
+        position_time_s=position_time,
+        position_mm=position - recording.surface_mm,
+        force_time_s=force_time,
+        force_N=force,
+        fit_from_s=fit_from,
+        fit_to_s=fit_to,
+        marks=list(recording.steps),
+        surface_std_mm=recording.surface_std_mm,
+        notes=notes,
+    )
+
+
+def delays_of(recording: Recording) -> Delays:
+    """The `timing` block of the bench file inside the recording; zero where there is none."""
+    text = recording.attachments.get(BENCH_FILE)
+    if text is None:
+        return Delays()
+    path = Path(f"{recording.source}:{BENCH_FILE}")
+    data = yamlfile.parse(text.decode(errors="replace"), path).data
+    timing = data.get("timing") if isinstance(data, dict) else None
+    if not isinstance(timing, dict):
+        return Delays()
+    return Delays(_seconds(timing, "force_delay", path), _seconds(timing, "position_delay", path))
+
+
+def increasing(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """Samples sorted by time, those of equal time averaged; both shape (n,), the result (k,) with k <= n."""
+    if np.all(np.diff(time_s) > 0):
+        return time_s, values
+    stamps, inverse, counts = np.unique(time_s, return_inverse=True, return_counts=True)
+    return stamps, np.bincount(inverse, weights=values) / counts
+
+
+def _seconds(timing: dict[str, object], key: str, path: Path) -> float:
+    value = timing.get(key) or 0.0
+    if not isinstance(value, int | float):
+        raise InputError(str(path), f"timing.{key} must be seconds, not {value!r}")
+    return float(value)
+
+
+def _channel(what: str, time_s: Array, values: Array, notes: list[str]) -> tuple[Array, Array]:
+    """The samples that are numbers, in the order of strictly increasing times."""
+    good = np.isfinite(values) & np.isfinite(time_s)
+    time_s, values = time_s[good], values[good]
+    back = int(np.count_nonzero(np.diff(time_s) < 0))
+    if back:
+        notes.append(f"{what}: {back} stamps lie before the one that came first; put in order")
+    stamps, merged = increasing(time_s, values)
+    if stamps.size < time_s.size:
+        notes.append(f"{what}: {time_s.size - stamps.size} {MERGED_TIMES}")
+    return stamps, merged
+
+
+def _forces(recording: Recording, delays: Delays, notes: list[str]) -> tuple[Array, Array]:
+    cell = recording.load_cell
+    flagged: NDArray[np.bool_] = cell.flagged
+    bad = int(flagged.sum())
+    if bad:
+        notes.append(f"{bad} force samples that the device called bad (overload) left out")
+    good = ~flagged
+    return _channel("force", cell.time_s[good] - delays.force_s, cell.force_N[good], notes)
+
+
+def _span(recording: Recording, place: str) -> tuple[float, float]:
+    if not recording.steps:
+        return -np.inf, np.inf
+    starts = [mark.time_s for mark in recording.steps if mark.phase == "steps"]
+    if not starts:
+        phase = recording.steps[-1].phase
+        raise InputError(place, f"the run ended before its first step (in its {phase})", "there is nothing to fit")
+    stops = [event.time_s for event in recording.events if event.name == STOPPED]
+    return min(starts), min(stops, default=np.inf)
+
+
+def _report_gaps(what: str, time_s: Array, notes: list[str]) -> None:
+    if time_s.size < 3:
+        return
+    steps = np.diff(time_s)
+    gaps = np.flatnonzero(steps > GAP * np.median(steps))
+    # Where the rate itself changes (thinned data, a poll beside a stream) long steps come in rows; no gap then.
+    alone = [i for i in gaps.tolist() if steps[i] > GAP * _around(steps, i)]
+    if alone:
+        worst = max(alone, key=lambda i: float(steps[i]))
+        notes.append(
+            f"{what}: {len(alone)} gaps in the samples, the longest {steps[worst]:.3g} s at {time_s[worst]:.6g} s"
+        )
+
+
+def _around(steps: Array, i: int) -> float:
+    before, after = steps[i - 1] if i else steps[1], steps[i + 1] if i + 1 < steps.size else steps[-2]
+    return float(max(before, after))
+
+
+def _report_spikes(what: str, time_s: Array, values: Array, notes: list[str]) -> None:
+    """Single samples that leave and come back at once; they are reported, whoever fits decides about them."""
+    if values.size < 8:
+        return
+    off = values[1:-1] - 0.5 * (values[:-2] + values[2:])
+    steps = np.abs(np.diff(values))
+    before = np.concatenate([steps[:1], steps[:-2]])
+    after = np.concatenate([steps[2:], steps[-1:]])
+    noise = 1.4826 * float(np.median(np.abs(off)))
+    if noise == 0.0 and np.any(off):  # a channel that mostly stands still
+        noise = 1.4826 * float(np.median(np.abs(off[off != 0])))
+    moved = np.maximum(before, after)
+    spikes = np.flatnonzero((np.abs(off) > SPIKE * noise) & (np.abs(off) > SPIKE_OVER_STEPS * moved))
+    if spikes.size:
+        notes.append(f"{what}: {spikes.size} isolated drop-outs, the first at {time_s[spikes[0] + 1]:.6g} s")
+
+
+def _name(source: Path) -> str:
+    """What a person calls the data: the run folder's name, or the file's without suffix."""
+    if source.name == "recording.mcap":
+        return source.resolve().parent.name
+    return source.name if source.is_dir() else source.stem

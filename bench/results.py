@@ -1,0 +1,104 @@
+"""What is made of a recording: the fit, its files, the report. Used after every run, and by `padbench report`."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bench import identify
+from bench.errors import InputError
+from bench.fitview import fit_view
+from bench.modelfile import write_model
+from bench.recording import Recording, read_recording
+from bench.report import Plan as PlannedCurve
+from bench.report import write_report
+from bench.run.folder import FIT, MODEL, REPORT
+
+if TYPE_CHECKING:
+    from bench.identify import FitResult
+    from bench.plan import Plan
+
+
+@dataclass(frozen=True)
+class Results:
+    """The files beside a recording; `fit` is None where there is none, and `problem` says why."""
+
+    folder: Path
+    fit: FitResult | None
+    problem: str
+    report: Path
+
+    def lines(self) -> list[str]:
+        """A few lines for a terminal."""
+        if self.fit is None:
+            return [f"no fit: {self.problem}"] if self.problem else []
+        return fit_lines(self.fit)
+
+
+def analyse(folder: Path, *, plan: Plan | None = None) -> Results:
+    """Fit the recording of a run folder, and write model.yaml, fit.json and report.html beside it.
+
+    What cannot be fitted (an air run, a run stopped before the pad) is said in the report. Raises `InputError` where
+    the recording cannot be read.
+    """
+    recording = read_recording(folder)
+    fit, problem = _fit_of(recording)
+    if fit is not None:
+        (folder / FIT).write_text(json.dumps(fit.to_json(), indent=2) + "\n", "utf-8")
+        write_model(folder / MODEL, fit.model)
+    report = folder / REPORT
+    write_report(
+        report,
+        recording,
+        fit_view(fit) if fit is not None else None,
+        plan=_planned(recording, plan),
+        fit_problem=problem,
+    )
+    return Results(folder, fit, problem, report)
+
+
+def fit_lines(fit: FitResult) -> list[str]:
+    """The fit in a few lines: structure, error beside noise, parameters with standard errors."""
+    size = f" of degree {fit.degree}" if fit.degree else ""
+    held = f", {1e3 * fit.held_out_rmse:.3g} mN on data held out" if math.isfinite(fit.held_out_rmse) else ""
+    lines = [
+        f"fit: {fit.law} law{size}, {fit.order} relaxation mode{'s' if fit.order > 1 else ''}, {fit.contact} contact",
+        f"  error {1e3 * fit.rmse:.3g} mN (noise of the data {1e3 * fit.noise_floor:.3g} mN){held}; "
+        f"{fit.fit_percent:.2f} % of the force explained",
+    ]
+    width = max(len(name) for name in fit.parameters)
+    for name, parameter in fit.parameters.items():
+        doubt = f" ± {parameter.std:.2g}" if math.isfinite(parameter.std) else ""
+        verdict = "   undetermined by these data" if name in fit.undetermined else ""
+        lines.append(f"  {name:<{width}} = {parameter.value:.5g}{doubt} {parameter.unit}{verdict}")
+    lines += [f"  note: {note}" for note in fit.notes]
+    return lines
+
+
+def _fit_of(recording: Recording) -> tuple[FitResult | None, str]:
+    if recording.surface_mm is None:
+        stopped = recording.result is None or recording.result.get("status") != "done"
+        return None, "the run ended before the pad's surface was found" if stopped else "there was no pad (air run)"
+    try:
+        return identify.fit(recording.measurement()), ""
+    except InputError as error:
+        return None, error.message
+
+
+def _planned(recording: Recording, plan: Plan | None) -> PlannedCurve | None:
+    """The planned motion of the steps, laid where the run began them (pad frame, the recording's clock)."""
+    if plan is None or any(segment.kind.startswith("force") for segment in plan.segments):
+        return None
+    begin = next((mark.time_s for mark in recording.steps if mark.phase in ("precondition", "steps")), None)
+    if begin is None:
+        return None
+    from bench.predict import predict
+
+    prediction = predict(plan, None)
+    offset = np.asarray(prediction.time_s) + begin
+    return PlannedCurve(offset, prediction.position_mm, None)
