@@ -21,8 +21,6 @@ from drivers.spec import LoadCellSpec, MotorSpec
 if TYPE_CHECKING:
     from sim.model import Model
 
-__all__ = ["Bench", "Limits", "Machine", "Simulation", "Timing", "find_shipped", "load_bench", "load_model", "simulated"]
-
 DEFAULT_PAD = "polyurethane"
 
 

@@ -230,9 +230,7 @@ class _Planner:
         return segment
 
     @staticmethod
-    def _still(
-        name: str, phase: Phase, kind: Kind, path: tuple[Key, ...], duration_s: float, at_mm: float
-    ) -> Segment:
+    def _still(name: str, phase: Phase, kind: Kind, path: tuple[Key, ...], duration_s: float, at_mm: float) -> Segment:
         return Segment(name, phase, kind, path, at_mm, at_mm, duration_s=duration_s)
 
     def _force_speed(self, flat: FlatStep, step: ForceStep) -> float:
@@ -246,10 +244,10 @@ class _Planner:
         )
         if allowed >= step.speed:
             return step.speed
-        of = f"the model's {stiffness:.3g} N/mm" if known else f"{UNKNOWN_STIFFNESS_N_mm:g} N/mm, for want of a model"
+        pad = f"{stiffness:.3g} N/mm" if known else f"{UNKNOWN_STIFFNESS_N_mm:g} N/mm (taken for want of a model)"
         message = (
-            f"approaches {step.to_force:g} N at {allowed:.3g} mm/s, not at the {step.speed:g} mm/s asked for: the force "
-            f"is seen {self.latency_s * 1e3:.3g} ms late, and at {of} it would overshoot by more than "
+            f"approaches {step.to_force:g} N at {allowed:.3g} mm/s, not at the {step.speed:g} mm/s asked for: seen "
+            f"{self.latency_s * 1e3:.3g} ms late, a pad of {pad} would be over the target by more than "
             f"{OVERSHOOT_SHARE:.0%}"
         )
         self._once(flat.name, message, (*flat.path, "speed"), severity="notice")
@@ -271,8 +269,8 @@ class _Planner:
                 self._once("approach", message, ("approach", "force"), "lower it")
             elif force > self.limits.force_N:
                 message = (
-                    f"speed: at {approach.speed:g} mm/s a stiff sample ({UNKNOWN_STIFFNESS_N_mm:g} N/mm) is touched with "
-                    f"{force:.3g} N before the axis has stopped, beyond {self.limits.force_N:g} N"
+                    f"speed: at {approach.speed:g} mm/s a stiff sample ({UNKNOWN_STIFFNESS_N_mm:g} N/mm) is touched "
+                    f"with {force:.3g} N before the axis has stopped, beyond {self.limits.force_N:g} N"
                 )
                 self._once("approach", message, ("approach", "speed"), "approach slower")
         if self.acceleration > self.limits.acceleration_mm_s2:

@@ -179,7 +179,7 @@ class _Timeline:
             positions[n] = at
         if bounded:
             self.unreached.append(index)
-        self._note(np.arange(1, steps + 1) * dt, positions)
+        self._note(np.linspace(dt, segment.duration_s, steps), positions)
 
     def _stiffness(self) -> float:
         assert self.believed is not None

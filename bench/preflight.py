@@ -40,6 +40,7 @@ class Outcome:
     duration_s: float
     deepest_mm: float
     highest_mm: float
+    start_N: float
     peak_N: float
     least_N: float
 
@@ -115,7 +116,7 @@ def check(
     outcomes = _outcomes(prediction)
     problems = list(planned.problems)
     problems += _travel(planned, outcomes, surface_mm)
-    problems += _depth(planned, prediction, outcomes)
+    problems += _unreached(prediction, outcomes)
     if believed is None and not planned.in_air:
         cure = "give the pad's model with --pad; for a pad that has none yet, begin with `first_contact`"
         problems.append(Problem("", "no pad model: forces are not predicted", "notice", cure=cure))
@@ -168,6 +169,7 @@ def _outcomes(prediction: Prediction) -> tuple[Outcome, ...]:
                 deepest_mm=float(position.max()),
                 highest_mm=float(position.min()),
                 # but its force is what the segment before has done
+                start_N=float(force[0]),
                 peak_N=float(force[1:].max()) if force.size > 1 else float(force[0]),
                 least_N=float(force[1:].min()) if force.size > 1 else float(force[0]),
             )
@@ -186,17 +188,21 @@ def _worst(outcomes: Iterable[Outcome], key: Callable[[Outcome], float]) -> list
 
 
 def _forces(planned: Plan, outcomes: tuple[Outcome, ...]) -> Iterator[Problem]:
+    """Steps that go beyond a limit; not those that only come back from there."""
     limits = planned.limits
-    for outcome in _worst((o for o in outcomes if o.peak_N > limits.force_N + TOLERANCE), lambda o: o.peak_N):
+    pressed = (o for o in outcomes if o.peak_N > max(limits.force_N, o.start_N) + TOLERANCE)
+    for outcome in _worst(pressed, lambda o: o.peak_N):
         segment = outcome.segment
         yield Problem(
             segment.name,
-            f"{outcome.peak_N:.3g} N are expected at {outcome.deepest_mm:.3g} mm, beyond limits.force {limits.force_N:g} N",
+            f"{outcome.peak_N:.3g} N are expected, at up to {outcome.deepest_mm:.3g} mm: beyond limits.force "
+            f"{limits.force_N:g} N",
             kind="prediction",
             cure="go less deep, or slower; raise the limit only if bench and sample stand it",
             path=segment.path,
         )
-    for outcome in _worst((o for o in outcomes if o.least_N < -limits.tension_N - TOLERANCE), lambda o: -o.least_N):
+    pulled = (o for o in outcomes if o.least_N < min(-limits.tension_N, o.start_N) - TOLERANCE)
+    for outcome in _worst(pulled, lambda o: -o.least_N):
         yield Problem(
             outcome.segment.name,
             f"a pull of {-outcome.least_N:.3g} N is expected, beyond limits.tension {limits.tension_N:g} N",
@@ -206,12 +212,12 @@ def _forces(planned: Plan, outcomes: tuple[Outcome, ...]) -> Iterator[Problem]:
         )
 
 
-def _depth(planned: Plan, prediction: Prediction, outcomes: tuple[Outcome, ...]) -> Iterator[Problem]:
+def _unreached(prediction: Prediction, outcomes: tuple[Outcome, ...]) -> Iterator[Problem]:
     for index in prediction.unreached:
         outcome = outcomes[index]
         segment = outcome.segment
         if segment.kind == "force_hold":
-            what = f"holding {segment.target_N:g} N is expected to creep to {outcome.deepest_mm:.3g} mm, all that is allowed"
+            what = f"{segment.target_N:g} N held would creep to {outcome.deepest_mm:.3g} mm, all that is allowed"
         else:
             what = (
                 f"{segment.target_N:g} N are not expected before {outcome.deepest_mm:.3g} mm, all that is allowed: "
@@ -219,13 +225,6 @@ def _depth(planned: Plan, prediction: Prediction, outcomes: tuple[Outcome, ...])
             )
         cure = "lower the target, or raise limits.depth"
         yield Problem(segment.name, what, kind="prediction", cure=cure, path=segment.path)
-    if planned.in_air or prediction.bounded:
-        return
-    deep = (o for o in outcomes if o.deepest_mm > planned.limits.depth_mm + TOLERANCE)
-    for outcome in _worst(deep, lambda o: o.deepest_mm):
-        message = f"{outcome.deepest_mm:.3g} mm are expected, beyond limits.depth {planned.limits.depth_mm:g} mm"
-        cure = "lower the target or the speed, or raise limits.depth"
-        yield Problem(outcome.segment.name, message, kind="prediction", cure=cure, path=outcome.segment.path)
 
 
 def _travel(planned: Plan, outcomes: tuple[Outcome, ...], surface_mm: float | None) -> Iterator[Problem]:

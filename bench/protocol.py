@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, PrivateAttr, Tag, model_validator
 
 from bench.complaints import FieldError
-from bench.places import Key, Places, spell
+from bench.places import Key, Places
 from bench.shipped import find_file
 from bench.yamlfile import read_yaml, validate
 
@@ -95,11 +95,10 @@ class BlockStep(_Part):
 
 
 def _kind_of_step(value: Any) -> str | None:
-    kinds = {"to": "depth step", "to_force": "force step", "block": "block of steps"}
-    if isinstance(value, dict):
-        return next((tag for key, tag in kinds.items() if key in value), None)
-    classes = {DepthStep: "depth step", ForceStep: "force step", BlockStep: "block of steps"}
-    return classes.get(type(value))
+    kinds: dict[str, str] = {"to": "depth step", "to_force": "force step", "block": "block of steps"}
+    if isinstance(value, _Part):
+        return next((tag for key, tag in kinds.items() if hasattr(value, key)), None)
+    return next((tag for key, tag in kinds.items() if key in value), None) if isinstance(value, dict) else None
 
 
 Step = Annotated[
@@ -252,7 +251,9 @@ def _check_count(steps: list[Step], path: tuple[Key, ...], times: int) -> int:
         here = (*path, i)
         if isinstance(step, BlockStep):
             inside = times * step.repeat
-            total += step.repeat * (_check_count(step.steps, (*here, "steps"), inside) if inside <= MAX_STEPS else inside)
+            total += (
+                step.repeat if inside > MAX_STEPS else step.repeat * _check_count(step.steps, (*here, "steps"), inside)
+            )
             here = (*here, "repeat")
         else:
             total += 1

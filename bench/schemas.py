@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal
 
 from bench.config import Bench
@@ -35,9 +36,10 @@ def _effects() -> list[dict[str, Any]]:
             properties: dict[str, Any] = {"id": {"const": effect.id}, "form": {"const": form.name}}
             for parameter in form.parameters:
                 bounds = {"type": "number", "minimum": parameter.lower, "maximum": parameter.upper}
+                std = {"type": ["number", "null"], "minimum": 0}
                 quantity = {
                     "type": "object",
-                    "properties": {"value": bounds, "unit": {"const": parameter.unit}, "std": {"type": ["number", "null"]}},
+                    "properties": {"value": bounds, "unit": {"const": parameter.unit}, "std": std},
                     "required": ["value"],
                     "additionalProperties": False,
                 }
@@ -69,11 +71,7 @@ def _as_draft_07(node: Any) -> Any:
     for key, value in node.items():
         if key == "prefixItems":
             out["items"] = _as_draft_07(value)
-        elif key == "discriminator":  # OpenAPI's
-            continue
-        elif value in (float("inf"), float("-inf")):  # no bound
-            continue
-        else:
+        elif key != "discriminator" and value not in (math.inf, -math.inf):  # OpenAPI's own; no bound at all
             out[key] = _as_draft_07(value)
     if "$ref" in out and len(out) > 1:  # draft-07 ignores what stands beside a $ref
         out["allOf"] = [{"$ref": out.pop("$ref")}]

@@ -11,7 +11,6 @@ from bench.errors import InputError
 
 Kind = Literal["protocol", "bench", "pad"]
 _FOLDERS: dict[Kind, str] = {"protocol": "", "bench": "benches", "pad": "pads"}
-_SUFFIXES = (".yaml", ".yml")
 
 
 def shipped_names(kind: Kind) -> list[str]:
@@ -39,13 +38,16 @@ def find_file(kind: Kind, name_or_path: str | Path) -> Path:
         return found
     if path.exists() and not path.is_dir():  # a pipe, a terminal: reading it says what is wrong
         return path
-    what = "is a directory, not a file" if path.is_dir() else f"there is no such file, and no shipped {kind} of that name"
+    absent = f"there is no such file, and no shipped {kind} of that name"
+    what = "is a directory, not a file" if path.is_dir() else absent
     raise InputError(name, what, _suggestion(kind, path))
 
 
 def _suggestion(kind: Kind, path: Path) -> str:
     names = shipped_names(kind)
-    close = difflib.get_close_matches(path.stem.lower(), names, n=1, cutoff=0.5)
+    word = path.stem.lower()
+    begun = [name for name in names if word and name.startswith(word)]
+    close = begun or difflib.get_close_matches(word, names, n=1, cutoff=0.5)
     guess = f"did you mean `{close[0]}`? " if close else ""
     return f"{guess}shipped: {', '.join(names)}"
 

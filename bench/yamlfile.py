@@ -31,7 +31,7 @@ M = TypeVar("M", bound=BaseModel)
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 50
-MAX_NODES = 100_000
+MAX_NODES = 30_000
 """Nodes after aliases are expanded; a spline law or a register map has some hundred."""
 
 _SAFE_INT = 2**53
@@ -74,16 +74,19 @@ class _Loader(Reader, Scanner, Parser, Composer, BaseResolver):
         Parser.__init__(self)
         Composer.__init__(self)
         BaseResolver.__init__(self)
-        self.depth = 0
+        self.depth = self.nodes = 0
 
     def compose_node(self, parent: Any, index: Any) -> Any:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         if getattr(event, "tag", None) is not None:
             raise _Refusal(event.start_mark, f"the tag `{event.tag}` is not allowed here", "write the value alone")
         self.depth += 1
+        self.nodes += 1
+        if self.nodes > MAX_NODES:
+            raise _Refusal(event.start_mark, f"more than {MAX_NODES} values")
         if self.depth > MAX_DEPTH:
             raise _Refusal(event.start_mark, f"nested more than {MAX_DEPTH} deep")
-        node = super().compose_node(parent, index)  # type: ignore[no-untyped-call]
+        node = super().compose_node(parent, index)
         self.depth -= 1
         return node
 
@@ -179,7 +182,7 @@ def parse(text: str, path: Path) -> Document:
     places = Places(str(path))
     builder = _Builder(places)
     try:
-        node = _Loader(text).get_single_node()  # type: ignore[no-untyped-call]
+        node = _Loader(text).get_single_node()
         data = None if node is None else builder.build(node, ())
     except _Refusal as refusal:
         line, column = refusal.mark.line + 1, refusal.mark.column + 1

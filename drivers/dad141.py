@@ -12,6 +12,7 @@ import math
 import re
 from typing import Any, Literal
 
+from drivers.dad141_filter import delay_s, output_interval_s
 from drivers.dad141_lines import FULL_SCALE, LINE_SIZE, Combined, LineCutter, checksum, parse_combined
 from drivers.errors import CrcError, DeviceTimeout, DriverError, ExceptionReply, Overload, UnexpectedReply
 from drivers.loadcell import ForceSample, LoadCellIdentity
@@ -19,9 +20,6 @@ from drivers.timing import LineTimer
 from drivers.wire import Exchange, Link, Pause, Steps
 
 DEFAULT_BAUDRATE = 115200
-DEVICE_RATE_HZ = 600.0
-"""Measurements a second at update rate 0; update rate n averages 2^n of them."""
-
 REPLY_S = 0.4
 """Time-out for commands: the device's transmission delay can be set up to 255 ms."""
 
@@ -58,6 +56,7 @@ class Dad141:
         self.decimals = decimals
         self.filter_delay_s = 0.0
         self.lost_lines = 0
+        self._device_interval_s = output_interval_s(0, False, 0)
         self._newtons_per_unit = newtons_per_unit
         self._capacity_N = capacity_N
         self._newtons_per_count = math.nan
@@ -82,9 +81,9 @@ class Dad141:
         settings: dict[str, int | None] = {}
         for command in ("FL", "FM", "UR"):
             settings[command] = yield from self._setting(command)
-        averaged = 2 ** (settings["UR"] or 0)
-        # A mean of n values is as old as the middle one of them.
-        self.filter_delay_s = 0.5 * (averaged - 1) / DEVICE_RATE_HZ
+        setup = (settings["FL"] or 0, settings["FM"] == 1, settings["UR"] or 0)
+        self.filter_delay_s = delay_s(*setup)
+        self._device_interval_s = output_interval_s(*setup)
         self._newtons_per_count = self._newtons_per_unit * 10.0**-self.decimals
         details: dict[str, Any] = {
             "id": kind[1].decode(),
@@ -94,7 +93,7 @@ class Dad141:
             "filter": settings["FL"],
             "filter_mode": settings["FM"],
             "update_rate": settings["UR"],
-            "averaging_delay_s": self.filter_delay_s,
+            "filter_delay_s": self.filter_delay_s,
             "checksum": "strict" if self.strict else "off",
         }
         return LoadCellIdentity("Flintec DAD 141.1", details)
@@ -173,13 +172,13 @@ class Dad141:
         return self._next_poll_s
 
     def latency_s(self) -> float:
-        """Interval, wire and averaging: the age of the newest sample just before the next one comes."""
+        """Interval, wire and filter: the age of the newest sample just before the next one comes."""
         return self._interval_s() + self.link.wire_s(BYTES_ON_WIRE) + self.filter_delay_s
 
     def _interval_s(self) -> float:
         if self.rate_hz is not None:
             return 1.0 / self.rate_hz
-        fastest = 1.0 / DEVICE_RATE_HZ
+        fastest = self._device_interval_s
         if self.mode == "poll":
             return max(fastest, self.link.wire_s(BYTES_ON_WIRE + 3) + self.link.gap_s + 0.002)
         return max(fastest, self.link.wire_s(BYTES_ON_WIRE + 1), self._timer.interval_s or 0.0)
@@ -204,7 +203,7 @@ class Dad141:
         self._collect(good, arrivals, received_s)
 
     def _collect(self, good: list[Combined], arrivals: list[float], received_s: float) -> None:
-        # The value was taken when its line began to be sent, and is as old as the averaging makes it.
+        # The value was taken when its line began to be sent, and is as old as the filter makes it.
         delay_s = self.link.wire_s(BYTES_ON_WIRE) + self.filter_delay_s
         for reading, sent_s in zip(good, self._timer.stamp(arrivals), strict=True):
             self._samples.append(self._sample(reading, sent_s - delay_s, received_s))

@@ -148,7 +148,12 @@ class Orca:
         yield from self._hold_here()
 
     def is_homed(self) -> Steps[bool]:
-        """Whether an auto zero has been completed since power-up (MOTOR_STATUS bit 0)."""
+        """Whether an auto zero has been completed since power-up (MOTOR_STATUS bit 0).
+
+        A motor whose zero mode allows none (negative, manual) has its zero where somebody set it: nothing to do.
+        """
+        if (yield self._modbus.read_holding(Register.ZERO_MODE))[0] not in (2, 3):
+            return True
         status = (yield self._modbus.read_holding(Register.MOTOR_STATUS))[0]
         return bool(status & AUTO_ZERO_DONE)
 

@@ -185,7 +185,7 @@ class BenchPlant:
 
     def _motion_now(self) -> tuple[float, float]:
         """Set-point and its speed where the next command starts; the axis itself when released."""
-        if self._axis[a.MODE] == a.RELEASED:
+        if self._axis[a.MODE] in (a.RELEASED, a.PUSH):
             return float(self._axis[a.POSITION]), float(self._axis[a.SPEED])
         position, speed, _ = self._setpoint_at(self._axis, self._command_s)
         return position, speed
@@ -213,6 +213,24 @@ class BenchPlant:
     def release(self) -> None:
         """Servo off: pad, rail friction and (if vertical) weight move the axis."""
         self._axis[a.MODE] = a.RELEASED
+
+    def push(self, force_N: float, damping_N_s_mm: float = 0.0) -> None:
+        """Drive with a force instead of to a position, less a damping force against the speed.
+
+        Raises ValueError for a damping below 0, or so strong that it would swing within a substep.
+        """
+        settings = self.settings
+        if not 0.0 <= damping_N_s_mm * settings.substep_s * 1000.0 <= settings.moving_mass_kg:
+            limit = settings.moving_mass_kg / settings.substep_s / 1000.0
+            raise ValueError(f"damping must be from 0 to {limit:g} N*s/mm, not {damping_N_s_mm:g}")
+        self._axis[a.MODE] = a.PUSH
+        self._axis[a.PUSH_FORCE], self._axis[a.PUSH_DAMPING] = force_N, damping_N_s_mm
+
+    def limit_force(self, force_N: float) -> None:
+        """What the drive can push from now on, N; never more than `settings.max_force_N`."""
+        if not force_N >= 0.0:
+            raise ValueError("a force limit is 0 or more")
+        self._s[a.MAX_FORCE] = min(force_N, self.settings.max_force_N)
 
     def brake(self, on: bool) -> None:
         """Clamp the mover, or let it go."""

@@ -41,9 +41,10 @@ POSITION, SPEED, FORCE, MOTOR_FORCE, INTEGRAL, AT_STOP = range(6)
 # … and what it was told: mode, set-point and its speed; of a profile its start, direction, speeds and durations
 MODE, BRAKED, SETPOINT, FEED, FEED_UNTIL = range(6, 11)
 P_TIME, P_START, P_END, P_SIGN, P_SPEED, P_A1, P_T1, P_T2, P_PEAK, P_A3, P_T3 = range(11, 22)
-AXIS = 22
+PUSH_FORCE, PUSH_DAMPING = 22, 23
+AXIS = 24
 
-RELEASED, STREAM, PROFILE = range(3)
+RELEASED, STREAM, PROFILE, PUSH = range(4)
 
 # history rows
 H_POSITION, H_SPEED, H_FORCE, H_SENSED, H_MOTOR, H_SETPOINT, HISTORY = range(7)
@@ -90,8 +91,9 @@ def run_axis(
     program_p, params_p, state_p = pointer(program), pointer(params), pointer(state)
     for n in range(first + 1, last + 1):
         target, speed, acceleration = setpoint_at(axis, (n - 1) * h)
-        if axis[MODE] == RELEASED:
-            motor = 0.0
+        if axis[MODE] == RELEASED or axis[MODE] == PUSH:
+            motor = axis[PUSH_FORCE] - axis[PUSH_DAMPING] * v if axis[MODE] == PUSH else 0.0
+            motor = max(-s[MAX_FORCE], min(s[MAX_FORCE], motor))
             axis[INTEGRAL] = 0.0
             target = x
         else:

@@ -13,7 +13,7 @@ A module-level function may call any of these by their global name. Left alone, 
 over ordinary sequences (`block.python`, `compiled.python`), which is how they are tested against themselves.
 
 **The cache.** numba keeps compiled code on disk, and looks only at the file a function stands in: an edit in a *called*
-function of another file goes unnoticed. So the folder is named after a hash of all of sim's sources.
+function of another file goes unnoticed. So the folder is named after a hash of all of sim's sources; for a function that stands elsewhere, of those beside it too.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import sys
 import tempfile
 import time
 import types
-from collections.abc import Callable, Iterator, MutableSequence
+from collections.abc import Callable, Iterable, Iterator, MutableSequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
@@ -45,13 +45,16 @@ KEEP_FOLDERS = 8
 KEEP_UNUSED_S = 30 * 86400.0
 
 
-def sources_hash(package: Path) -> str:
-    """Hash of every Python source below `package`, of numba's version and of Python's."""
+SIM = Path(__file__).resolve().parent
+
+
+def sources_hash(files: Iterable[Path]) -> str:
+    """Hash of the files with their names, of numba's version and of Python's."""
     from importlib.metadata import version
 
     digest = hashlib.sha256(f"{version('numba')} {sys.version}".encode())
-    for path in sorted(package.rglob("*.py")):
-        digest.update(str(path.relative_to(package)).encode() + b"\0")
+    for path in sorted(files):
+        digest.update(str(path).encode() + b"\0")
         digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
@@ -74,7 +77,7 @@ def cache_folder() -> Path:
     Without a writable cache folder it is a private one under the system's temporary folder: compiled code is loaded
     and run, so a folder that others can write to will not do.
     """
-    name = sources_hash(Path(__file__).parent)
+    name = sources_hash(SIM.rglob("*.py"))
     for root in _roots():
         folder = root / name
         try:
@@ -115,14 +118,22 @@ def _prune(root: Path, keep: Path) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
+@functools.cache
+def _folder_for(beside: Path) -> Path:
+    """Where code compiled from sources in the folder `beside` is kept."""
+    if beside.resolve().is_relative_to(SIM):
+        return cache_folder()
+    return cache_folder() / sources_hash(beside.glob("*.py"))
+
+
 @contextmanager
-def _numba_cache() -> Iterator[Any]:
+def _numba_cache(function: Callable[..., Any]) -> Iterator[Any]:
     """Numba, with its cache in our folder while it looks (other users of numba in this process keep theirs)."""
     import numba
 
     config: Any = numba.config
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_folder())
+    config.CACHE_DIR = str(_folder_for(Path(function.__code__.co_filename).parent))
     try:
         yield numba
     finally:
@@ -171,7 +182,7 @@ class Compiled(_Deferred, Generic[P, R]):
     def native(self) -> Callable[P, R]:
         """The compiled function itself; call this one where 0.1 µs a call matters."""
         bound = _bound(self.python)
-        with _numba_cache() as numba:
+        with _numba_cache(bound) as numba:
             result: Callable[P, R] = numba.njit(self.signature, cache=True, error_model="numpy")(bound)
         return result
 
@@ -203,7 +214,7 @@ class Block(_Deferred):
     @functools.cached_property
     def _native(self) -> Any:
         bound = _bound(self.python)
-        with _numba_cache() as numba:
+        with _numba_cache(bound) as numba:
             pointer = numba.types.CPointer(numba.types.float64)
             double = numba.types.float64
             return numba.cfunc(double(double, double, pointer, pointer), cache=True, error_model="numpy")(bound)
@@ -295,4 +306,4 @@ call_block = _Intrinsic("call_block", _call_block)
 """`call_block(address, dt, u, state, i, parameters, j)`: the block at `address` on `state[i:]` and `parameters[j:]`."""
 
 pointer = _Intrinsic("pointer", _pointer)
-"""`pointer(array)`: to its first element. An array is a counted reference, which costs at every call it is passed to."""
+"""`pointer(array)`: to its first element. Arrays are counted references, which costs at every call."""

@@ -127,6 +127,7 @@ def free_surface(
         width *= 2.0
         high += width
         f_high = surface_force(program, params, state, shift, dt, high, A, B, factor)
+    s = high
     side = 0
     for _ in range(200):
         s = high - f_high * (high - low) / (f_high - f_low)
@@ -145,9 +146,9 @@ def free_surface(
             if side == 1:
                 f_low *= 0.5
             side = 1
-        if abs(f) <= 1e-15 or high - low <= 1e-15 * (1.0 + abs(high)):
+        if abs(f) <= 1e-15:
             break
-    return high
+    return float(s)
 
 
 @compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64)")
@@ -204,7 +205,7 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
     state[pad + PAD_DEPTH] = depth
     state[pad + PAD_FORCE] = F
     state[pad + SURFACE] = surface
-    return F + total(program, params, state, shift, PROBE, dt, y)
+    return float(F + total(program, params, state, shift, PROBE, dt, y))
 
 
 @compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), float64, float64, float64)")
@@ -272,7 +273,7 @@ def solve(program: Ints, params: Doubles, state: Doubles, dt: float, x: float) -
         state[inner + k] = state[trial + k]
     state[RESIDUAL] = f_b
     state[CELL] = state[TRIAL_CELL]
-    return b
+    return float(b)
 
 
 @compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), float64, float64)")
@@ -286,7 +287,7 @@ def plant_step(program: Ints, params: Doubles, state: Doubles, dt: float, x: flo
         y = solve(program, params, state, dt, x)
     state[X] = x
     state[Y] = y
-    return state[CELL]
+    return float(state[CELL])
 
 
 @compiled("void(int64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")

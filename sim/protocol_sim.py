@@ -71,7 +71,7 @@ class Serial(SerialBase):
     def read(self, size: int = 1, /) -> bytes:
         """At most `size` bytes: those that are there (timeout 0), or waiting for all of them (timeout, None)."""
         line = self._connected()
-        timeout_s = self._timeout
+        timeout_s = self.timeout
         data = line.host_read(size)
         if timeout_s == 0 or len(data) == size:
             return data

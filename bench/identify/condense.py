@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ._kernel import Array
 from .motion import holds
 from .problem import Problem, Run
 
@@ -27,7 +28,8 @@ def condensed(problem: Problem, target: int = TARGET) -> tuple[Problem, list[NDA
         return problem, [np.arange(run.size) for run in problem.runs]
     length = max(1, int(np.ceil(moving / max(target - blocks_of_holds, target // 3))))
     growth = 0.06 if blocks_of_holds < target else 0.06 * blocks_of_holds / target
-    runs, owners = [], []
+    runs: list[Run] = []
+    owners: list[NDArray[np.intp]] = []
     for run, stretches in zip(problem.runs, still, strict=True):
         owner = _blocks(run, stretches, length, growth)
         runs.append(_averaged(run, owner))
@@ -61,7 +63,7 @@ def _blocks(run: Run, stretches: list[slice], length: int, growth: float) -> NDA
 
 def _averaged(run: Run, owner: NDArray[np.intp]) -> Run:
     count = np.bincount(owner).astype(float)
-    weight = np.bincount(owner, run.weight)
+    weight: Array = np.bincount(owner, run.weight)
     time = np.bincount(owner, run.time_s) / count
     u = np.bincount(owner, run.u) / count
     with np.errstate(invalid="ignore"):

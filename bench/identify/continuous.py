@@ -77,7 +77,7 @@ def fit(
         degree=structure.family.degree or None,
         traces=traces,
         evidence=_evidence(choice, unit),
-        notes=notes.about_data(problem, noise) + notes.about_fit(problem, best),
+        notes=notes.about_data(problem, noise, structure.unilateral) + notes.about_fit(problem, best),
         noise=noise,
         independent_samples=spread.samples,
         covariance=covariance,

@@ -42,9 +42,7 @@ def held_out_square(short: Problem, full: Problem, owners: list[NDArray[np.intp]
     total = 0.0
     for k in range(FOLDS):
         kept = [np.where(f == k, 0.0, run.weight) for f, run in zip(folds, short.runs, strict=True)]
-        left = [
-            np.where(f[o] == k, run.weight, 0.0) for f, o, run in zip(folds, owners, full.runs, strict=True)
-        ]
+        left = [np.where(f[o] == k, run.weight, 0.0) for f, o, run in zip(folds, owners, full.runs, strict=True)]
         if sum(float(w.sum()) for w in left) == 0 or sum(float(w.sum()) for w in kept) == 0:
             continue
         refit = polish(short.weighted(kept), estimate, max_steps=25, tolerance=1e-6)

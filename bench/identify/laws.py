@@ -104,6 +104,8 @@ def polynomial(degree: int) -> Family:
     if degree > 1:  # the exponential's shapes, as near as this degree comes to them
         u, model = np.linspace(0.01, 1.0, 60), exponential()
         line, basis = shape(u, np.zeros(degree - 1))
-        starts = np.array([np.linalg.lstsq(basis, model.shape(u, t)[0] - line, rcond=None)[0] for t in model.starts[:9]])
+        starts = np.array(
+            [np.linalg.lstsq(basis, model.shape(u, t)[0] - line, rcond=None)[0] for t in model.starts[:9]]
+        )
     bound = np.full(degree - 1, 1e3)
     return Family("polynomial", degree - 1, -bound, bound, starts, shape, numbers, degree)

@@ -68,7 +68,11 @@ def holds(time_s: Array, position: Array) -> list[slice]:
         if drift > steady or time_s[stop - 1] <= time_s[start]:
             continue
         # Neighbours of one hold, cut where a drift or a jump of one noise width ran over the tolerance.
-        if out and out[-1].stop >= start - 1 and abs(np.median(position[out[-1]]) - np.median(position[start:stop])) < tolerance:
+        if (
+            out
+            and out[-1].stop >= start - 1
+            and abs(np.median(position[out[-1]]) - np.median(position[start:stop])) < tolerance
+        ):
             out[-1] = slice(out[-1].start, int(stop))
         else:
             out.append(slice(int(start), int(stop)))

@@ -13,42 +13,49 @@ from .noise import Noise
 from .problem import Problem
 
 
-def about_data(problem: Problem, noise: Noise) -> list[str]:
-    """What is wrong or missing in the data themselves, whatever the model."""
+def about_data(problem: Problem, noise: Noise, unilateral: bool) -> list[str]:
+    """What is wrong or missing in the data themselves. `unilateral`: a pad that lets go shows no force in air."""
     out = list(problem.notes)
     several = len(problem.measurements) > 1
     for m in problem.measurements:
-        found = [*m.notes, *_about(m, noise)]
+        found = [*m.notes, *_about(m, noise, unilateral)]
         out += [f"{m.name}: {line}" for line in found] if several else found
     speeds = np.concatenate([_move_speeds(m, problem.depth_mm) for m in problem.measurements])
     if len(speeds) and speeds.max() < 1.5 * speeds.min():
-        out.append(f"All moves are at one speed ({np.median(speeds):.3g} mm/s): what other speeds do rests on the model.")
+        out.append(
+            f"All moves are at one speed ({np.median(speeds):.3g} mm/s): what other speeds do rests on the model."
+        )
     if not noise.from_holds:
-        out.append("There is no hold: the noise was judged from the motion, and slow modes are told from drift by the model alone.")
+        out.append("There is no hold: the noise was judged from the motion, slow modes by the model alone.")
     if problem.depth_mm < 10 * noise.position_mm:
         out.append("The depth is less than ten times the noise of the position: the elastic law cannot be told.")
     return out
 
 
-def _about(m: Measurement, noise: Noise) -> list[str]:
+def _about(m: Measurement, noise: Noise, unilateral: bool) -> list[str]:
     out = []
     force, depth = m.force_N, np.interp(m.force_time_s, m.position_time_s, m.position_mm)
     top = float(np.abs(force).max())
     deepest = depth > 0.7 * depth.max()
     if float(np.mean(force[deepest])) < -3 * noise.force_N:
-        out.append("The force is negative at depth: its sign is reversed (load cell `sign: -1`), or this is no pad pressed in.")
+        out.append(
+            "The force is negative at depth: its sign is reversed (load cell `sign: -1`), or this is no pad pressed in."
+        )
     elif top < 10 * noise.force_N:
         out.append(f"The force ({top:.3g} N at most) is less than ten times its noise.")
     level = _cap(force)
     if level is not None:
-        out.append(f"The force stands at {level:.4g} N again and again, with nothing above: the channel is saturated there.")
-    out += _level_notes(m, depth, noise, top)
+        out.append(
+            f"The force stands at {level:.4g} N again and again, with nothing above: the channel is saturated there."
+        )
+    out += _level_notes(m, depth, noise, top, unilateral)
     if deepest.any() and float(depth.max()) > 0:
         rising = np.flatnonzero(np.abs(force - _first_level(force)) > max(8 * noise.force_N, 0.01 * top))
         start = depth[rising[0]] / depth.max() if len(rising) else 0.0
         if start > 0.3:
             out.append(
-                f"The force rises only from {depth[rising[0]]:.4g} mm on: the surface may not be at 0 mm, where the model has it."
+                f"The force rises only from {depth[rising[0]]:.4g} mm on: the surface may not be at 0 mm,"
+                " where the model has it."
             )
     return out
 
@@ -57,24 +64,29 @@ def _first_level(force: Array) -> float:
     return float(np.mean(force[: max(3, min(20, len(force) // 50))]))
 
 
-def _level_notes(m: Measurement, depth: Array, noise: Noise, top: float) -> list[str]:
+def _level_notes(m: Measurement, depth: Array, noise: Noise, top: float, unilateral: bool) -> list[str]:
     count = max(3, min(20, len(depth) // 50))
     start, begun = _first_level(m.force_N), float(np.mean(depth[:count]))
     large = max(6 * noise.force_N, 0.01 * top)
     if begun > 0.02 * depth.max() and abs(start) > large:
         return [
-            f"The data begin at {begun:.3g} mm with {start:.3g} N on the pad: the model starts from rest there, its past is not known."
+            f"The data begin at {begun:.3g} mm with {start:.3g} N on the pad: the model starts from rest there,"
+            " its past is not known."
         ]
     out = []
     air = depth < -0.002 * np.ptp(depth)
-    if int(air.sum()) >= 10:
+    if unilateral and int(air.sum()) >= 10:
         level = float(np.mean(m.force_N[air]))
         edge = max(int(air.sum()) // 5, 1)
         change = float(np.mean(m.force_N[air][-edge:]) - np.mean(m.force_N[air][:edge]))
         if abs(level) > max(noise.force_N, 0.003 * top) or abs(change) > max(noise.force_N, 0.003 * top):
-            out.append(f"In air the force reads {level:.3g} N and changes by {change:+.3g} N over the run: tare or drift.")
+            out.append(
+                f"In air the force reads {level:.3g} N and changes by {change:+.3g} N over the run: tare or drift."
+            )
     elif abs(start) > large:
-        out.append(f"The force is {start:.3g} N before the probe has gone in: an offset or a preload, which the model has not.")
+        out.append(
+            f"The force is {start:.3g} N before the probe has gone in: an offset or a preload, which the model has not."
+        )
     return out
 
 
@@ -140,8 +152,8 @@ def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
     slow = [1 / nu for nu, a in zip(rates, weights[1:], strict=True) if a > 0 and 1 / nu > 0.5 * span]
     if slow:
         out.append(
-            f"The slowest mode ({max(slow):.3g} s) is longer than half the run ({span:.3g} s): how far the force goes on"
-            " falling is not known."
+            f"The slowest mode ({max(slow):.3g} s) is longer than half the run ({span:.3g} s): how far the force"
+            " goes on falling is not known."
         )
     fast = [1 / nu for nu, a in zip(rates, weights[1:], strict=True) if a > 0 and 1 / nu < 3 * step]
     if fast:
@@ -149,7 +161,7 @@ def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
     if not estimate.converged:
         out.append("The search did not converge.")
     out.append(
-        f"Measured: times from {2 * step:.2g} s to {span:.3g} s, depths to {problem.depth_mm:.4g} mm. Beyond that the model"
-        " was not tried."
+        f"Measured: times from {2 * step:.2g} s to {span:.3g} s, depths to {problem.depth_mm:.4g} mm."
+        " Beyond that the model was not tried."
     )
     return out

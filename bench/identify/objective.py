@@ -44,7 +44,9 @@ class Piece:
     let_go: NDArray[np.bool_]
 
 
-def simulate(run: Run, structure: Structure, x: Array, derivatives: bool = False, shift: float = 0.0) -> Iterator[Piece]:
+def simulate(
+    run: Run, structure: Structure, x: Array, derivatives: bool = False, shift: float = 0.0
+) -> Iterator[Piece]:
     """The model on a run from rest, chunk by chunk; `shift` is added to the depth u."""
     theta, rates, weights = structure.split(x)
     r, P = structure.order, structure.size
@@ -87,7 +89,7 @@ def normal_equations(problem: Problem, structure: Structure, x: Array) -> tuple[
 
 
 def forces(problem: Problem, structure: Structure, x: Array) -> list[tuple[Array, NDArray[np.bool_], Array]]:
-    """Of each run, over its union grid: simulated force, let-go, elastic response (of the free surface after let-go)."""
+    """Of each run, over its union grid: simulated force, let-go, elastic response (after let-go the free surface's)."""
     out = []
     for run in problem.runs:
         pieces = list(simulate(run, structure, x))

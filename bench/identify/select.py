@@ -20,6 +20,7 @@ from .uncertainty import independent_samples
 
 CONTENDERS = 6  # candidates polished on all the data
 CLEAR = 6.0  # difference of the criterion that decides (some 20 to 1 in odds)
+LONG = 300_000  # samples beyond which candidates far behind are not refined, nor tried on left-out blocks
 RESOLVED = 1e-5  # of the largest force: no force channel is better, no difference of errors below it means anything
 
 
@@ -83,8 +84,7 @@ def choose(
             progress(f"{ladder.name}, order {first + 1} to {max(orders)}")
         ladder.climb(max(orders))
     estimates = [e for side in ladders.values() for ladder in side for e in ladder.found if e.structure.order in orders]
-    inside = _scatter_within(problem, short, owners)
-    candidates = [Candidate(e, (e.cost + inside) / problem.weight) for e in estimates]
+    candidates = [Candidate(e, e.cost / problem.weight) for e in estimates]
     lowest = min(candidates, key=lambda c: c.V)
     refined = polish(problem, lowest.estimate, max_steps=10)
     independent = independent_samples(problem, refined.x, refined.structure)
@@ -92,25 +92,32 @@ def choose(
     ranked = sorted(candidates, key=lambda c: (not c.eligible, c.criterion))
     judged = []
     for rank, c in enumerate(ranked):
-        if rank < CONTENDERS:
-            progress(f"comparing {c.estimate.structure.family.name}, order {c.estimate.structure.order}")
-            judged.append(_finished(c, problem, short, owners, independent))
-        else:  # far behind: the short data tell enough
-            held = held_out_square(short, short, [np.arange(r.size) for r in short.runs], c.estimate)
-            judged.append(replace(c, held_out_square=held + inside / problem.weight))
+        progress(f"comparing {c.estimate.structure.family.name}, order {c.estimate.structure.order}")
+        judged.append(_finished(c, problem, short, owners, independent, contender=rank < CONTENDERS))
     best = _pick(judged)
     if all(best is not c for c in judged[:CONTENDERS]):
-        better = _finished(best, problem, short, owners, independent)
+        better = _finished(best, problem, short, owners, independent, contender=True)
         judged = [better if c is best else c for c in judged]
         best = better
     return Choice(best, judged, independent)
 
 
 def _finished(
-    c: Candidate, problem: Problem, short: Problem, owners: list[NDArray[np.intp]], independent: float
+    c: Candidate,
+    problem: Problem,
+    short: Problem,
+    owners: list[NDArray[np.intp]],
+    independent: float,
+    contender: bool,
 ) -> Candidate:
-    """Polished on all the data, its held-out error taken on all of them."""
-    e = polish(problem, c.estimate)
+    """V and held-out error on all the data; a contender is polished there to the end, one far behind hardly."""
+    if contender:
+        e = polish(problem, c.estimate)
+    elif problem.size <= LONG:
+        e = replace(polish(problem, c.estimate, max_steps=2), converged=c.estimate.converged)
+    else:
+        V = objective.cost(problem, c.estimate.structure, c.estimate.x) / problem.weight
+        return _judged(replace(c, V=V), independent)
     held = held_out_square(short, problem, owners, e)
     return _judged(Candidate(e, e.cost / problem.weight, held), independent)
 
@@ -148,14 +155,6 @@ def _lets_go(problem: Problem, ladders: list[Ladder]) -> bool:
         for e in one.found
         for _, gone, _ in objective.forces(problem, e.structure, e.x)
     )
-
-
-def _scatter_within(full: Problem, short: Problem, owners: list[NDArray[np.intp]]) -> float:
-    """Σ w (y − block mean)²: what the short data do not show, the same for every model."""
-    total = 0.0
-    for run, block, owner in zip(full.runs, short.runs, owners, strict=True):
-        total += float(np.sum(run.weight * (run.y - block.y[owner]) ** 2))
-    return total
 
 
 def _judged(c: Candidate, independent: float) -> Candidate:

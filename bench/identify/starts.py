@@ -119,13 +119,23 @@ class Starter:
         for g in self._grams:
             found += [(left, g, columns, a) for left, columns, a in g.best(order, count=2)]
         found.sort(key=lambda item: item[0])
-        return [self._x(g, columns, a) for _, g, columns, a in found[:count]]
+        return [self._x(g, columns, a) for _, g, columns, a in found[:count]] or [self._plain(order)]
+
+    def _plain(self, order: int) -> Array:
+        """A start where no choice of rates has positive shares alone: nearly elastic, the rates spread out."""
+        grams = self._grams or []
+        gains = [g.right[0] / max(g.matrix[0, 0], 1e-300) for g in grams]
+        left = [g.square - gain * g.right[0] for g, gain in zip(grams, gains, strict=True)]
+        k = int(np.argmin(left))
+        columns = np.linspace(1, GRID, order + 2)[1:-1].astype(int).tolist()
+        return self._x(grams[k], columns, np.concatenate([[max(gains[k], 1e-3)], np.zeros(order)]))
 
     def next(self, structure: Structure, x: Array) -> list[Array]:
         """One more mode beside those of a fit of the order below: at least as good as that fit."""
         theta, rates, _ = structure.split(x)
         new = self.bounds.grid()
         apart = np.all(np.abs(np.log(new[:, None] / rates)) > 0.3, axis=1)
+        apart[np.argmax(np.min(np.abs(np.log(new[:, None] / rates)), axis=1))] = True
         both = np.concatenate([rates, new[apart]])
         elastic = [e for _, _, e in objective.forces(self.problem, structure, x)] if self.unilateral else None
         keep = None
@@ -135,6 +145,10 @@ class Starter:
         g = gram(self.problem, self.family, theta, both, elastic, keep)
         best = g.best(structure.order + 1, tuple(range(1, structure.order + 1)), count=1)
         best += g.best(structure.order + 1, count=1)
+        if not best:  # a mode that the data give no share: in the widest gap
+            gaps = np.min(np.abs(np.log(new[:, None] / rates)), axis=1)
+            spare = np.concatenate([[np.log(new[np.argmax(gaps)])], [1e-3 * x[-structure.order - 1 :].sum()]])
+            return [np.concatenate([theta, np.log(rates), spare[:1], x[-structure.order - 1 :], spare[1:]])]
         return [self._x(g, columns, a) for _, columns, a in best]
 
     def _x(self, g: Gram, columns: list[int], a: Array) -> Array:

@@ -41,7 +41,8 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
     inverse[np.ix_(free, free)] = _inverted(H)
     by_scores = inverse @ _windowed(scores, 2 * lags) @ inverse
     by_colour = inverse @ _coloured(sensitivity, gamma) @ inverse
-    freedom = max(total / max(total - free.sum(), 1.0), 1.0)
+    independent = total / _memory(gamma)
+    freedom = min(independent / max(independent - free.sum(), 1.0), 3.0)  # what the fit itself took out of the residual
     widest = np.sqrt(np.maximum(np.diag(by_scores), np.diag(by_colour)) * freedom)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.where(np.diag(by_colour) > 0, widest / np.sqrt(np.diag(by_colour)), 1.0)
@@ -123,7 +124,7 @@ def _summed(rows: Array, m: int) -> Array:
 
 
 def _autocovariance(errors: list[Array]) -> tuple[Array, int]:
-    """γ(0) … γ(L) of the residual, up to where it has died away (below 5 % or two standard errors), L+1."""
+    """γ(0) … γ(L) of the residual, up to where it has died away (2 %, or its own error), L+1."""
     longest = max(len(e) for e in errors)
     total = sum(len(e) for e in errors)
     most = max(longest // 4, 1)
@@ -136,7 +137,7 @@ def _autocovariance(errors: list[Array]) -> tuple[Array, int]:
     gamma /= total
     if gamma[0] <= 0:
         return gamma[:1], 1
-    small = np.flatnonzero(gamma / gamma[0] < max(0.05, 2 / np.sqrt(total)))
+    small = np.flatnonzero(gamma / gamma[0] < max(0.02, 1.5 / np.sqrt(total)))
     last = int(small[0]) if len(small) else most
     return gamma[: max(last, 1)], max(last, 1)
 

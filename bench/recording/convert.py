@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.errors import InputError
 from bench.recording.csv_file import COMMAND, GROSS, MOTOR_FORCE, OVERLOAD
@@ -136,6 +137,6 @@ def _finite(time_s: Array, values: Array) -> tuple[Array, Array]:
     return increasing(time_s[good], values[good])
 
 
-def _first_of_each(time_s: Array) -> Array:
+def _first_of_each(time_s: Array) -> NDArray[np.intp]:
     """Indices of the first row of each time, in the order of time."""
     return np.unique(time_s, return_index=True)[1]

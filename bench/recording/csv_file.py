@@ -57,11 +57,13 @@ def read_csv(path: Path, columns: Mapping[str, str] | None = None, units: Mappin
         surface_mm=0.0,
         notes=[f"{path}: {note}" for note in table.notes],
     )
-    recording.extra_time_s = np.where(np.isnan(time), force_time, time)
+    row_time = np.where(np.isnan(time), force_time, time)
+    rows = np.flatnonzero(~np.isnan(row_time))
+    recording.extra_time_s = row_time[rows]
     taken = {table.header[i] for i in place.values()} | set(side)
     for i, name in enumerate(table.header):
         if name and name not in taken:
-            _keep(recording, table, i, name)
+            _keep(recording, table, i, rows)
     return recording
 
 
@@ -82,7 +84,7 @@ def _stamped(table: Table, time: Array, sampled: NDArray[np.bool_], time_at: int
             table.place(row, time_at),
             f"time goes back: {table.rows[row][time_at].strip()} after {table.rows[before][time_at].strip()} "
             f"(line {table.lines[before]})",
-            "one file holds one measurement in the order of time; are two joined here, or the rows sorted by another column?",
+            "a file holds one measurement in the order of time; were two joined, or the rows sorted otherwise?",
         )
     if rows.size > 1 and time[rows[0]] == time[rows[-1]]:
         raise InputError(str(table.path), f"all samples have the same time in {name!r}", "is it the right column?")
@@ -130,12 +132,11 @@ def _side_column(table: Table, name: str, taken: set[int]) -> Array:
     return _numbers(table, table.header.index(name))
 
 
-def _keep(recording: Recording, table: Table, column: int, name: str) -> None:
-    """An extra column: numbers where all its cells are, else text."""
-    cells = [row[column].strip() for row in table.rows]
-    if table.decimal_comma:
-        cells = [cell.replace(",", ".") for cell in cells]
+def _keep(recording: Recording, table: Table, column: int, rows: NDArray[np.intp]) -> None:
+    """An extra column, at `rows`: numbers where all its cells are, else text."""
+    words = [table.rows[i][column].strip() for i in rows]
+    cells = [cell.replace(",", ".") for cell in words] if table.decimal_comma else words
     try:
-        recording.extra[name] = np.array([float(cell) if cell else math.nan for cell in cells])
+        recording.extra[table.header[column]] = np.array([float(cell) if cell else math.nan for cell in cells])
     except ValueError:
-        recording.extra_text[name] = [row[column].strip() for row in table.rows]
+        recording.extra_text[table.header[column]] = words

@@ -64,7 +64,7 @@ class ProcessStore:
             raise InputError(str(path), f"no recording can begin: {self.problem or self._last_words()}")
 
     @property
-    def pid(self) -> int:
+    def pid(self) -> int | None:
         """The writer's process id."""
         return self._process.pid
 

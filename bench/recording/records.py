@@ -12,14 +12,15 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
-from typing import cast
+from typing import Any, cast
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Header, Metadata, Schema
 from mcap.stream_reader import get_chunk_data_stream
-from mcap.writer import MCAP0_MAGIC as MAGIC
+from mcap.writer import MCAP0_MAGIC
 
+MAGIC: bytes = MCAP0_MAGIC
 Buffer = bytes | mmap.mmap
 
 RECORD = struct.Struct("<BQ")
@@ -92,7 +93,7 @@ def parse(opcode: int, body: bytes) -> Found | None:
     return cast(Found, found)
 
 
-_KINDS = {
+_KINDS: dict[int, Any] = {
     Opcode.HEADER: Header,
     Opcode.SCHEMA: Schema,
     Opcode.CHANNEL: Channel,

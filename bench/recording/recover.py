@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -103,7 +104,7 @@ def _rewrite(scan: Scan, source: Path, draft: Path) -> RecoverReport:
         if report.lost:
             lost = [line.removeprefix("lost: ") for line in report.lines() if line.startswith("lost: ")]
             copy.writer.add_metadata(RECOVERED, {"from": source.name, "lost": "; ".join(lost)})
-        copy.writer.finish()
+        copy.finish()
     finally:
         copy.stream.close()
     return report
@@ -115,6 +116,7 @@ class _Copy:
     def __init__(self, path: Path, scan: Scan) -> None:
         self.stream = path.open("wb")
         self.writer = Writer(self.stream, compression=CompressionType.ZSTD)
+        self._end_chunk: Callable[[], None] = self.writer.flush
         self._scan = scan
         header = scan.header
         self._ours = header is None or header.library.startswith(LIBRARY)
@@ -137,14 +139,19 @@ class _Copy:
         elif isinstance(found, Channel):
             self._channel(found)
         elif isinstance(found, Metadata):
-            self.writer.flush()
+            self._end_chunk()
             self.writer.add_metadata(found.name, found.metadata)
             self._report.metadata += 1
             self._records.add(found.name)
         elif isinstance(found, Attachment):
-            self.writer.flush()
+            self._end_chunk()
             self.writer.add_attachment(found.create_time, found.log_time, found.name, found.media_type, found.data)
             self._report.attachments += 1
+
+    def finish(self) -> None:
+        """Write index and footer."""
+        end: Callable[[], None] = self.writer.finish
+        end()
 
     def account(self) -> RecoverReport:
         """Counts, damage, and what the sequence numbers of our own recordings say is missing."""

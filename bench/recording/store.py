@@ -18,6 +18,11 @@ class Store(Protocol):
     lost: int
     """Messages that could not be taken."""
 
+    @property
+    def pid(self) -> int | None:
+        """The process that writes, if it is another one."""
+        ...
+
     def message(self, channel_id: int, log_ns: int, data: bytes, publish_ns: int, sequence: int) -> None:
         """One message."""
         ...
@@ -59,6 +64,11 @@ class InlineStore:
         self._closed = False
         self._file = McapFile(path, topics, epoch_ns)
         self._add = self._file.add_message
+
+    @property
+    def pid(self) -> int | None:
+        """None: it is this process."""
+        return None
 
     def message(self, channel_id: int, log_ns: int, data: bytes, publish_ns: int, sequence: int) -> None:
         """One message; see `Store`."""

@@ -26,7 +26,8 @@ def without_truth(text: str) -> tuple[str, str | None]:
     if not pairs:
         return text, None
     key, value = pairs[0]
-    start, end = key.start_mark.index, _end(text, value)
+    start = key.start_mark.index
+    end = _end(text, start, value)
     wanted = yaml.safe_load(text)
     del wanted[BLOCK]
     rest = text[:start] + text[end:]
@@ -39,10 +40,14 @@ def without_truth(text: str) -> tuple[str, str | None]:
     return rest, text[start:end]
 
 
-def _end(text: str, value: yaml.Node) -> int:
-    """Where the block's text ends: with the line break after its last line, where nothing follows on that line."""
+def _end(text: str, start: int, value: yaml.Node) -> int:
+    """Where the block's text ends: after its last line, before comments that stand at the margin behind it."""
     end: int = value.end_mark.index
-    line_end = text.find("\n", end)
-    line_end = len(text) if line_end < 0 else line_end + 1
-    tail = text[end:line_end].strip()
-    return line_end if not tail or tail.startswith("#") else end
+    if "\n" not in text[start:end]:
+        line_end = text.find("\n", end)
+        alone = line_end >= 0 and not text[end:line_end].strip()
+        return line_end + 1 if alone else end
+    lines = text[start:end].splitlines(keepends=True)
+    while len(lines) > 1 and (not lines[-1].strip() or lines[-1].startswith("#")):
+        end -= len(lines.pop())
+    return end

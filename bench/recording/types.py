@@ -74,7 +74,7 @@ class Recording:
     `surface_mm` is where the pad's surface stands in the motor frame, by touch-off (`surface_std_mm` its standard
     deviation); None while it is not known. CSV data are in the pad frame already: surface 0, std 0.
     `run` is the `padbench.run` record, `result` the `padbench.result` record (None: the run did not finish, or
-    there was none: CSV). The truth of a simulated bench (`padbench.simulation`) is not here: nothing that fits may see it.
+    there was none: CSV). The truth of a simulated bench (`padbench.simulation`) is not here: no fit may see it.
     """
 
     source: Path

@@ -207,6 +207,11 @@ class Recorder:
         self._store.close()
         return self._store.problem
 
+    @property
+    def writer_pid(self) -> int | None:
+        """Process id of the writer process, where there is one."""
+        return self._store.pid
+
     def totals(self) -> dict[str, int]:
         """Samples, events and marks handed in so far."""
         return {

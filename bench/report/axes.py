@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 WIDE = 860.0
 """Width of a plot that takes the whole page, in points."""
 HALF = 430.0
-_LEFT, _RIGHT, _GAP = 58.0, 12.0, 30.0
+_LEFT, _RIGHT, _GAP = 58.0, 20.0, 30.0
 
 PHASES = ("tare", "approach", "precondition", "steps", "finish")
 """Phases of a run; each is also the name of its colour."""
@@ -157,8 +157,8 @@ def _name_phases(ax: Axes, phases: Sequence[Span]) -> None:
             )
 
 
-NOT_MARKED = frozenset({"log", "note", "retry", "timeout", "crc", "overrun", "flush", "motor_error", "load_cell_error"})
-"""Events that may come by the hundred: counted in a table, not drawn."""
+NOT_MARKED = frozenset({"devices", "clamps", "homed", "retry", "timeout", "overrun", "motor_error", "safe_state"})
+"""Events that say nothing about the curves, or may come by the hundred: in the table, not drawn."""
 
 
 def marked_events(events: Sequence[Event], most: int = 40) -> list[tuple[int, Event]]:

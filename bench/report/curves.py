@@ -13,11 +13,14 @@ from numpy.typing import NDArray
 from bench.recording.types import Recording
 from bench.report import axes as parts
 from bench.report.decimate import thin_path
+from bench.report.facts import has_surface
 from bench.report.style import TIME_RAMP, light
 from bench.report.svg import render
 from bench.report.view import Curve, FitView
 
 Array = NDArray[np.float64]
+
+_CURVE_HEIGHT = 240.0
 
 MOST_POINTS = 12_000
 """A curve that needs more points than this is embedded as a picture, which is then the smaller."""
@@ -51,7 +54,7 @@ def indentation(recording: Recording, fit: FitView | None) -> str:
         deepest, highest = float(np.nanmax(depth)), float(np.nanmin(depth))
         if deepest > 0.05 * (deepest - highest):  # the way through air says little: only its end is shown
             ax.set_xlim(max(highest - 0.01 * deepest, -0.12 * deepest), 1.02 * deepest)
-        ax.set_xlabel("depth, mm")
+        ax.set_xlabel("depth, mm" if has_surface(recording) else "motor position, mm")
         ax.set_ylabel("force, N")
         _time_bar(ax, time_s)
         if fit is not None:
@@ -110,10 +113,8 @@ def relaxation(curves: Sequence[tuple[str, Curve]]) -> str:
 
 
 def _curves(name: str, label: str, curves: Sequence[tuple[str, Curve]], x: str, y: str, *, log: bool) -> str:
-    height = 240.0
-
     def draw(figure: Figure) -> None:
-        [ax] = parts.panels(figure, [height], top=12.0)
+        [ax] = parts.panels(figure, [_CURVE_HEIGHT], top=12.0)
         for i, (run, curve) in enumerate(curves):
             colour = "simulated" if len(curves) == 1 else f"run-{i % 7}"
             _band(ax, curve, colour, run, ("-", "--", "-.", ":")[(i // 7) % 4] if len(curves) > 7 else "-", log)
@@ -131,7 +132,7 @@ def _curves(name: str, label: str, curves: Sequence[tuple[str, Curve]], x: str, 
         if len(curves) > 1 or any(curve.std is not None for _, curve in curves):
             parts.legend(ax, above=False)
 
-    return render(name, label, parts.HALF, parts.stacked([height], 12.0), draw)
+    return render(name, label, parts.HALF, parts.stacked([_CURVE_HEIGHT], 12.0), draw)
 
 
 def _band(ax: Axes, curve: Curve, colour: str, run: str, style: str, log: bool) -> None:
@@ -140,5 +141,6 @@ def _band(ax: Axes, curve: Curve, colour: str, run: str, style: str, log: bool) 
     ax.plot(x, y, style, color=light(colour), lw=1.8, label=run or "_nolegend_")
     if curve.std is not None:
         doubt = 1.96 * np.nan_to_num(curve.std[good])
-        label = "95 % band" if not run else "_nolegend_"
+        hidden = np.ptp(y) > 0 and float(2 * doubt.max()) < 2.0 / _CURVE_HEIGHT * float(np.ptp(y))
+        label = "95 % band" + (", thinner than the line" if hidden else "") if not run else "_nolegend_"
         ax.fill_between(x, y - doubt, y + doubt, color=light(colour), alpha=0.12 if run else 0.22, lw=0, label=label)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import datetime
 import json
 import math
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -35,9 +38,14 @@ _NAMES = {
     "date": "Date",
     "motor": "Motor",
     "load_cell": "Load cell",
+    "probe": "Probe",
+    "timing": "Timing",
     "run_id": "Run",
     "id": "Run",
 }
+FEW = 5
+"""Events of one name that are listed even where the plots do not show them."""
+
 _RESULT_SHOWN = frozenset({"status", "outcome", "state", "cause", "first_cause", "reason", "error"})
 _BESIDE = {
     "recording.mcap": "every sample, as measured (Foxglove, PlotJuggler)",
@@ -47,14 +55,15 @@ _BESIDE = {
 }
 
 
-def was(recording: Recording) -> str:
+def was(recording: Recording, host: Mapping[str, str] | None = None) -> str:
     """What the run was: protocol, sample, operator, note, conditions, bench, seed, date, simulated or not."""
     run = dict(recording.run)
+    began = started(recording, host)
     pairs: list[tuple[str, object]] = []
     for key, name in _NAMES.items():
-        if key in run:
-            value = _plain(run.pop(key))
-            pairs.append((name, value.replace("T", " ", 1) if key in ("started", "date") else value))
+        value = _plain(run.pop(key, ""))
+        pairs.append((name, began if key == "started" else value))
+    run |= {key: value for key, value in (host or {}).items() if key not in ("started", "padding")}
     rest = [(key.replace("_", " "), _plain(value)) for key, value in sorted(run.items())]
     if not recording.run:
         pairs.append(("Data", recording.source.name))
@@ -66,6 +75,45 @@ def was(recording: Recording) -> str:
     return markup.facts(pairs) + markup.folded("All records of the run", markup.facts(rest)) + files
 
 
+def started(recording: Recording, host: Mapping[str, str] | None = None) -> str:
+    """When the run was made: by the host's record, else by its folder's name, else by a real bench's clock (UTC).
+
+    A virtual clock starts at a fixed moment, which is no date. Empty where nothing tells.
+    """
+    for record in (host or {}, recording.run):
+        said = _plain(record.get("started") or record.get("date") or "")
+        if said:
+            return said.replace("T", " ", 1)
+    folder = re.match(r"(\d{4}-\d\d-\d\d)_(\d\d)(\d\d)(\d\d)_", recording.source.resolve().parent.name)
+    if folder:
+        return f"{folder[1]} {folder[2]}:{folder[3]}:{folder[4]}"
+    epoch = recording.run.get("epoch_ns", "")
+    if epoch.isdecimal() and not is_simulated(recording):
+        moment = datetime.datetime.fromtimestamp(int(epoch) / 1e9, tz=datetime.UTC)
+        return f"{moment:%Y-%m-%d %H:%M:%S} UTC"
+    return ""
+
+
+def is_simulated(recording: Recording) -> bool:
+    """Whether the bench was a simulated one, by the run's record."""
+    return _plain(recording.run.get("simulated", "")).lower() in ("true", "yes", "1")
+
+
+def sample_name(recording: Recording) -> str:
+    """The sample's id; empty where none was given."""
+    given = recording.run.get("sample", "")
+    try:
+        found = json.loads(given)
+    except ValueError:
+        return given
+    return str(found.get("id") or "") if isinstance(found, Mapping) else _plain(given)
+
+
+def has_surface(recording: Recording) -> bool:
+    """Whether depths count from a pad's surface, and not from the motor's own zero (a run without approach)."""
+    return recording.surface_mm is not None and all(event.name != "no_surface" for event in recording.events)
+
+
 def _plain(value: str) -> str:
     """A record's value for reading: JSON text, lists and objects unfolded into words; anything else as it is."""
     try:
@@ -75,7 +123,10 @@ def _plain(value: str) -> str:
     if isinstance(found, bool):
         return "yes" if found else "no"
     if isinstance(found, Mapping):
-        return "\n".join(markup.named(str(key), _word(item)) for key, item in found.items())
+        said = [_word(item) if key == "id" else markup.named(str(key), _word(item)) for key, item in found.items()]
+        return ", ".join(
+            part for part, item in zip(said, found.values(), strict=True) if item not in (None, "", [], {})
+        )
     if isinstance(found, list):
         return ", ".join(_word(item) for item in found)
     return "" if found is None else found if isinstance(found, str) else value
@@ -162,14 +213,16 @@ def _counters(value: str) -> str:
 def touch_off(recording: Recording) -> str:
     """Where the surface was found, how surely, and the tare and touch-off events with their numbers."""
     said = ""
-    if recording.surface_mm is not None and recording.run:
+    if recording.surface_mm is not None and not has_surface(recording):
+        said = "<p>No surface was looked for: positions count from the motor's own zero.</p>\n"
+    elif recording.surface_mm is not None and recording.run:
         said = (
             f"<p>The surface stands at <b>{recording.surface_mm:.4f} mm</b> in the motor frame, "
             f"± {1e3 * recording.surface_std_mm:.1f} µm (one standard deviation).</p>\n"
         )
     pairs: list[tuple[str, object]] = []
     for event in recording.events:
-        if event.name in ("tare", "touch_off", "touch", "home", "homed", "surface"):
+        if event.name in ("homed", "tare", "contact", "touch_off"):
             data = _event_data(event)
             pairs.append((event.name.replace("_", " "), f"at {event.time_s:.3f} s" + (f": {data}" if data else "")))
     return said + markup.facts(pairs)
@@ -180,17 +233,20 @@ def _event_data(event: Event) -> str:
 
 
 def event_table(recording: Recording, marked: Sequence[tuple[int, Event]]) -> str:
-    """The numbered events of the plots, and how often the others came."""
-    rows = [[str(n), f"{e.time_s:.3f}", e.name.replace("_", " "), _event_data(e)] for n, e in marked]
-    counted: dict[str, int] = {}
-    shown = {id(event) for _, event in marked}
-    for event in recording.events:
-        if id(event) not in shown:
-            counted[event.name] = counted.get(event.name, 0) + 1
+    """The events, numbered as in the plots, and how often those came that are too many to list."""
+    numbers = {id(event): str(n) for n, event in marked}
+    times = Counter(event.name for event in recording.events)
+    rows, counted = [], Counter[str]()
+    for event in sorted(recording.events, key=lambda e: e.time_s):
+        if id(event) in numbers or times[event.name] <= FEW:
+            said = [f"{event.time_s:.3f}", event.name.replace("_", " "), _event_data(event)]
+            rows.append([numbers.get(id(event), ""), *said])
+        else:
+            counted[event.name] += 1
     body = markup.table(["no.", "time, s", "event", "data"], rows, numeric=(1,))
     if counted:
-        rest = ", ".join(f"{name.replace('_', ' ')} {times}×" for name, times in sorted(counted.items()))
-        body += f"<p>Not drawn: {markup.text(rest)}.</p>\n"
+        rest = ", ".join(f"{name.replace('_', ' ')} {n}×" for name, n in sorted(counted.items()))
+        body += f"<p>Not listed: {markup.text(rest)}.</p>\n"
     return body
 
 

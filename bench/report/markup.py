@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import math
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -122,6 +123,14 @@ def digits(value: float, significant: int = 4) -> str:
     if size < -5 or size > 6:
         return f"{rounded:.{significant - 1}e}".replace("-", "−")
     return f"{rounded:.{max(0, significant - 1 - size)}f}".replace("-", "−")
+
+
+_RAISED = str.maketrans("0123456789-.", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻·")
+
+
+def raised(plain: str) -> str:
+    """Powers as people write them: `N/mm^2` → N/mm²."""
+    return re.sub(r"\^(-?[0-9.]+)", lambda m: m[1].translate(_RAISED), plain)
 
 
 def column(values: Sequence[float], significant: int = 3) -> list[str]:

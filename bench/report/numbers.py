@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bench.report import markup
@@ -19,6 +19,10 @@ _MEANING = {
 }
 
 
+NEAR = 8
+"""Structures that the table shows at once."""
+
+
 def meaning(name: str) -> str:
     """What a parameter is, in a few words."""
     head, _, index = name.partition("_")
@@ -29,7 +33,7 @@ def meaning(name: str) -> str:
     if head == "nu" and index.isdigit():
         return f"rate of relaxation mode {index}"
     if head in ("alpha", "a") and index.isdigit():
-        return f"coefficient of δ^{index}"
+        return markup.raised(f"coefficient of δ^{index}") if index != "1" else "coefficient of δ"
     if head in ("F", "force") and index.isdigit():
         return f"elastic force at point {index}"
     return ""
@@ -62,7 +66,7 @@ def parameters(fit: FitView) -> str:
         styles.append("off" if undetermined else "")
     if "c_0" not in given and "c_1" in given:
         rest = 1.0 - sum(of(entry)[0] for name, entry in given.items() if str(name).startswith("c_"))
-        rows.append([symbol("c_0"), digits(rest), "–", "1", "–", f"{meaning('c_0')}, from the others: 1 − Σ cᵢ"])
+        rows.append([symbol("c_0"), digits(rest), "–", "", "–", f"{meaning('c_0')}, from the others: 1 − Σ cᵢ"])
     head = ["parameter", "value", "std. dev.", "unit", "relative", "meaning"]
     formula = LAWS.get(str(fit.json.get("law")), ("", ""))[1]
     said = f"<p><code>{markup.text(formula)}</code> &nbsp; <code>g(t) = c₀ + Σ cᵢ·e^(−νᵢ·t)</code></p>\n"
@@ -70,10 +74,11 @@ def parameters(fit: FitView) -> str:
 
 
 def of(entry: Any) -> tuple[float, float, str]:
-    """Value, standard deviation (NaN: unknown) and unit of a parameter of fit.json."""
+    """Value, standard deviation (NaN: unknown) and unit (empty: a pure number) of a parameter of fit.json."""
     if not isinstance(entry, Mapping):
         return number(entry), math.nan, ""
-    return number(entry.get("value")), number(entry.get("std")), str(entry.get("unit") or "1")
+    unit = markup.raised(str(entry.get("unit") or ""))
+    return number(entry.get("value")), number(entry.get("std")), "" if unit == "1" else unit
 
 
 def time_constant(name: str, rate: float) -> str:
@@ -101,26 +106,37 @@ def merit(fit: FitView) -> str:
     )
 
 
-def evidence(rows: list[Evidence]) -> str:
-    """The structures tried, best first within each law, with the chosen one marked in words."""
-    if not rows:
-        return ""
-    held = any(math.isfinite(row.held_out_rmse_N) for row in rows)
-    ruled = any(math.isfinite(row.criterion) for row in rows)
-    least = min((row.criterion for row in rows if math.isfinite(row.criterion)), default=math.nan)
-    contacts = len({row.contact for row in rows}) > 1
-    values = [row.rmse_N for row in rows] + [row.held_out_rmse_N for row in rows]
-    scale, unit = (1e3, "mN") if max((v for v in values if math.isfinite(v)), default=1.0) < 0.5 else (1.0, "N")
-    head = ["law", "order", *(["contact"] if contacts else []), f"error, {unit} rms"]
-    head += [f"held out, {unit} rms"] if held else []
-    head += ["criterion above the best", "remark"] if ruled else ["remark"]
-    errors = markup.column([scale * row.rmse_N for row in rows])
-    left_out = markup.column([scale * row.held_out_rmse_N for row in rows])
-    lines = []
-    for row, error, other in zip(rows, errors, left_out, strict=True):
-        line = [row.law, str(row.order), *([row.contact] if contacts else []), error]
-        line += [other] if held else []
-        line += [f"{row.criterion - least:.1f}" if math.isfinite(row.criterion) else "–"] if ruled else []
-        lines.append([*line, ", ".join(x for x in ("chosen" if row.chosen else "", row.remark) if x)])
-    right = tuple(i for i, name in enumerate(head) if name not in ("law", "contact", "remark"))
-    return markup.table(head, lines, numeric=right, styles=["chosen" if row.chosen else "" for row in rows])
+def evidence(rows: Sequence[Evidence]) -> str:
+    """The structures tried, best first, with the chosen one marked in words; what is far behind is folded away."""
+    ranked = sorted(rows, key=lambda row: (row.criterion if math.isfinite(row.criterion) else math.inf, row.rmse_N))
+    near = [row for i, row in enumerate(ranked) if i < NEAR or row.chosen]
+    far = [row for row in ranked if row not in near]
+    more = markup.folded(f"{len(far)} further structures", _evidence(far, ranked))
+    return _evidence(near, ranked) + more if ranked else ""
+
+
+def _evidence(rows: Sequence[Evidence], among: Sequence[Evidence]) -> str:
+    held = any(math.isfinite(row.held_out_rmse_N) for row in among)
+    ruled = any(math.isfinite(row.criterion) for row in among)
+    least = min((row.criterion for row in among if math.isfinite(row.criterion)), default=math.nan)
+    contacts = len({row.contact for row in among}) > 1
+    largest = max((row.rmse_N for row in among if math.isfinite(row.rmse_N)), default=1.0)
+    scale, unit = (1e3, "mN") if largest < 0.5 else (1.0, "N")
+    columns: list[tuple[str, list[str]]] = [
+        ("law", [row.law for row in rows]),
+        ("order", [str(row.order) for row in rows]),
+    ]
+    if contacts:
+        columns.append(("contact", [row.contact for row in rows]))
+    columns.append((f"error, {unit} rms", markup.column([scale * row.rmse_N for row in rows])))
+    if held:
+        columns.append((f"held out, {unit} rms", markup.column([scale * row.held_out_rmse_N for row in rows])))
+    if ruled:
+        above = [row.criterion - least for row in rows]
+        columns.append(("criterion above the least", [f"{x:.1f}" if math.isfinite(x) else "–" for x in above]))
+    remarks = [", ".join(x for x in ("chosen" if row.chosen else "", row.remark) if x) for row in rows]
+    columns.append(("remark", remarks))
+    right = tuple(i for i, (name, _) in enumerate(columns) if name not in ("law", "contact", "remark"))
+    lines = list(zip(*(cells for _, cells in columns), strict=True))
+    styles = ["chosen" if row.chosen else "" for row in rows]
+    return markup.table([name for name, _ in columns], lines, numeric=right, styles=styles)

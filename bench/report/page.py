@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 from bench.recording.types import Event, Recording
 from bench.report import axes, curves, facts, markup, numbers, plots, verdict
-from bench.report.markup import figure, forces, section
+from bench.report.markup import digits, figure, forces, section
 from bench.report.verdict import Verdict
 from bench.report.view import Curve, Evidence, FitView, Plan, PlanView
 
@@ -22,14 +23,18 @@ def write_report(
     plan: Plan | None = None,
     title: str | None = None,
     fit_problem: str = "",
+    host: Mapping[str, str] | None = None,
 ) -> None:
     """Write the report of a run to `path`.
 
     `fit` is None where nothing was fitted, and `fit_problem` then says why. `plan` is on the recording's clock, in the
-    pad frame. The same input gives the same bytes. Files of the run folder are linked where they lie beside `path`
-    already, so write them first. Raises OSError where the file cannot be written.
+    pad frame. `host` is the recording's `padbench.host` record, for date and versions. The same input gives the same
+    bytes. Files of the run folder are linked where they lie beside `path` already, so write them first. Raises OSError
+    where the file cannot be written.
     """
-    text = report_page(recording, fit, plan=plan, title=title, fit_problem=fit_problem, beside=facts.beside(path))
+    text = report_page(
+        recording, fit, plan=plan, title=title, fit_problem=fit_problem, host=host, beside=facts.beside(path)
+    )
     path.write_text(text, encoding="utf-8")
 
 
@@ -40,19 +45,20 @@ def report_page(
     plan: Plan | None = None,
     title: str | None = None,
     fit_problem: str = "",
+    host: Mapping[str, str] | None = None,
     beside: str = "",
 ) -> str:
     """The report as HTML text (see `write_report`); `beside` is HTML already."""
     heading = title or _title(recording)
     events = axes.marked_events(recording.events)
     sections = [
-        ("run", "What the run was", facts.was(recording)),
+        ("run", "What the run was", facts.was(recording, host)),
         ("trajectory", "Trajectory", _trajectory(recording, plan, events)),
         ("force", "Force", _force(recording, fit, plan, events)),
         ("indentation", "Force against indentation", _indentation(recording, fit)),
         ("corner", "The fastest ramp, enlarged", _corner(recording, fit)),
         ("model", "Model", _model(fit)),
-        ("structures", "Structures tried", numbers.evidence(list(fit.evidence)) if fit else ""),
+        ("structures", "Structures tried", numbers.evidence(fit.evidence) if fit else ""),
         ("touch-off", "Tare and touch-off", facts.touch_off(recording)),
         ("sampling", "Sampling", facts.rates(recording)),
         ("traffic", "Traffic and counters", facts.traffic(recording)),
@@ -61,7 +67,7 @@ def report_page(
     there = [(anchor, name, body) for anchor, name, body in sections if body]
     links = " ".join(f'<a href="#{anchor}">{markup.text(name)}</a>' for anchor, name, _ in there)
     body = (
-        f'<h1>{markup.text(heading)}</h1>\n<p class="sub">{markup.text(_subtitle(recording))}</p>\n'
+        f'<h1>{markup.text(heading)}</h1>\n<p class="sub">{markup.text(_subtitle(recording, host))}</p>\n'
         + _verdicts(recording, fit, fit_problem)
         + f"<nav>{links}</nav>\n"
         + "".join(section(name, content, anchor) for anchor, name, content in there)
@@ -72,22 +78,16 @@ def report_page(
 
 
 def _title(recording: Recording) -> str:
-    run = recording.run
-    if not run:
+    if not recording.run:
         return recording.source.name or "Recording"
-    protocol, sample = run.get("protocol", ""), run.get("sample", "")
-    name = Path(protocol).stem if protocol and "\n" not in protocol else ""
-    return " · ".join(part for part in (name, sample) if part) or recording.source.name or "Run"
+    named = (recording.run.get("protocol", ""), facts.sample_name(recording))
+    return " · ".join(part for part in named if part) or recording.source.name or "Run"
 
 
-def _subtitle(recording: Recording) -> str:
+def _subtitle(recording: Recording, host: Mapping[str, str] | None) -> str:
     low, high = axes.time_span(recording)
-    run = recording.run
-    simulated = run.get("simulated", "").strip('"').lower()
-    kind = "simulated bench" if simulated in ("true", "yes", "1") else ""
-    started = run.get("started") or run.get("date") or ""
-    when = started.strip('"').replace("T", " ")
-    return " · ".join(part for part in (when, kind, f"{high - low:.1f} s recorded") if part)
+    kind = "simulated bench" if facts.is_simulated(recording) else ""
+    return " · ".join(x for x in (facts.started(recording, host), kind, f"{digits(high - low, 3)} s recorded") if x)
 
 
 def _verdicts(recording: Recording, fit: FitView | None, problem: str) -> str:
@@ -136,7 +136,8 @@ def _force(recording: Recording, fit: FitView | None, plan: Plan | None, events:
     if fit is not None:
         said = (
             "Above: force measured and simulated, the simulation driven by the measured motion alone. Below: measured "
-            "minus simulated. Where it leaves the band of the noise, the model leaves something unexplained."
+            "minus simulated. Where it leaves the band of the noise, the model leaves something unexplained. What came "
+            "before the first step is history: simulated, not fitted."
         )
     return figure(plots.force(recording, fit, plan, events), said)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bench.recording.types import Event, Recording
 from bench.report import axes as parts
+from bench.report.facts import has_surface
 from bench.report.style import light
 from bench.report.svg import render
 from bench.report.view import FitView, Plan
@@ -23,6 +24,7 @@ def trajectory(recording: Recording, plan: Plan | None, events: Sequence[tuple[i
     """Commanded and measured position over the whole run, in the pad frame where the surface is known."""
     heights = [230.0]
     offset = recording.surface_mm
+    surface = has_surface(recording)
     motor = recording.motor
 
     def draw(figure: Figure) -> None:
@@ -34,9 +36,9 @@ def trajectory(recording: Recording, plan: Plan | None, events: Sequence[tuple[i
             parts.line(ax, plan.time_s, plan.position_mm, "expected", "planned", style=":", width=1.6)
         parts.line(ax, motor.time_s, motor.command_mm - zero, "commanded", "commanded", width=3.2)
         parts.line(ax, motor.time_s, motor.position_mm - zero, "measured", "measured", width=1.0)
-        if offset is not None:
+        if surface:
             ax.axhline(0.0, color=light("noise"), lw=1.0, ls="--", zorder=1, label="pad surface")
-        ax.set_ylabel("depth, mm" if offset is not None else "motor position, mm")
+        ax.set_ylabel("depth, mm" if surface else "motor position, mm")
         ax.set_xlabel("time, s")
         parts.shade([ax], parts.step_spans(recording.steps, high))
         parts.mark([ax], events)
@@ -87,6 +89,8 @@ def _residual(ax: Axes, fit: FitView) -> None:
     if math.isfinite(floor) and floor > 0:
         band = 2 * floor * scale
         ax.axhspan(-band, band, color=light("noise"), alpha=0.22, lw=0, zorder=0.5, label="noise floor ± 2σ")
+        for edge in (-band, band):  # in front, where dense data would hide the band
+            ax.axhline(edge, color=light("noise"), lw=0.9, ls="--", zorder=3)
         top = max(top, 2.6 * floor)
     ax.axhline(0.0, color=light("muted"), lw=0.7)
     if top > 0:
@@ -123,7 +127,7 @@ def corner(recording: Recording, fit: FitView | None) -> str:
         zero = recording.surface_mm or 0.0
         piece(above, motor.time_s, motor.command_mm - zero, "commanded", "commanded", False, 2.2)
         piece(above, motor.time_s, motor.position_mm - zero, "measured", "measured", True, 0.9)
-        above.set_ylabel("depth, mm" if recording.surface_mm is not None else "position, mm")
+        above.set_ylabel("depth, mm" if has_surface(recording) else "position, mm")
         piece(below, cell.time_s, cell.force_N, "measured", "measured", True, 0.9)
         if fit is not None:
             piece(below, fit.time_s, fit.simulated_N, "simulated", "simulated", False, 1.7)

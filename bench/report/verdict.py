@@ -101,7 +101,7 @@ def run_verdict(recording: Recording) -> Verdict | None:
 def fit_verdict(fit: FitView | None, problem: str) -> Verdict:
     """What to say of the model."""
     if fit is None:
-        return Verdict("plain", "No model was fitted", [problem] if problem else [])
+        return Verdict("plain", "No model was fitted", [_sentence(problem)] if problem else [])
     rmse, floor, percent = fit.number("rmse"), fit.number("noise_floor"), fit.number("fit_percent")
     ratio = rmse / floor if floor > 0 else math.nan
     tone, judgement = judge(fit)
@@ -121,6 +121,10 @@ def fit_verdict(fit: FitView | None, problem: str) -> Verdict:
         sentences.append(f"These data do not determine {names}: another protocol is needed for that.")
         tone = "fair" if tone == "good" else tone
     return Verdict(tone, judgement, sentences)
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:] + ("" if words.endswith((".", "!", "?")) else ".")
 
 
 def judge(fit: FitView) -> tuple[str, str]:

@@ -66,7 +66,7 @@ def open_rig(bench: Bench) -> Rig:
     world = None
     clock: Clock
     if any(port.startswith("sim://") for port in (bench.motor.port, bench.load_cell.port)):
-        from bench.simulate import world_of
+        from bench.run.simulated import world_of
 
         world = world_of(bench)
         clock = world.clock

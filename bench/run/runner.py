@@ -82,7 +82,7 @@ def run_protocol(
     except PortError as error:
         raise InputError(bench.place((error.device, "port")), error.message) from error
     with rig:
-        mode: Literal["inline", "process"] = "inline" if rig.world is not None and rig.world.virtual else "process"
+        mode: Literal["inline", "process"] = "inline" if rig.world is not None and not rig.world.clock.wall else "process"
         with Recorder(folder / RECORDING, rig.clock, mode=mode) as recorder:
             recorder.begin(
                 _run_record(protocol, bench, notes or Notes()),

@@ -1,8 +1,9 @@
 """Where does the pad begin? The surface, extrapolated from a slow approach, with its uncertainty.
 
 Near first contact every elastic law looks like F = k (x − x0)^n with n between 1 (exponential law, flat punch) and
-2.5 (steep power laws); a few hundredths of a newton cannot tell which. So each exponent is fitted, and the surface
-is the average over them weighted by how well they fit: the doubt about the law is part of the uncertainty.
+3.5 (steep power laws), bent a little by its next term and by relaxation; a few hundredths of a newton cannot tell
+which. So each exponent is fitted, with a free next term k' (x − x0)^(n+1), and the surface is the average over them
+weighted by how well they fit: the doubt about the law is part of the uncertainty.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-EXPONENTS = (1.0, 1.5, 2.0, 2.5)
+EXPONENTS = (1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0, 3.5)
 """Exponents n of first contact: 1 flat punch or exponential law (9), 1.5 sphere (Hertz), 2 cone, 2.5 power law."""
 
 SIGMAS = 5.0
@@ -109,40 +110,40 @@ class _Fit:
 
 
 def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> _Fit | None:
-    """Least squares of level + k·max(0, x − x0)^n: x0 by a grid that closes in, level and k in closed form."""
+    """Least squares of level + k r^n + k' r^(n+1), r = max(0, x − x0): x0 by a grid that closes in, the rest linear."""
     span = float(x.max() - x.min())
-    lo, hi = float(x.min()), float(x.max())
+    lo, hi = float(x.min()), float(x.max()) - 1e-6 * span
     for _ in range(4):
         grid = np.linspace(lo, hi, 41)
         cost = np.array([_cost(x, force, x0, exponent)[0] for x0 in grid])
-        k = int(np.argmin(cost))
-        lo, hi = grid[max(k - 2, 0)], grid[min(k + 2, grid.size - 1)]
-    x0 = float(grid[k])
+        best = int(np.argmin(cost))
+        lo, hi = grid[max(best - 2, 0)], grid[min(best + 2, grid.size - 1)]
+    x0 = float(grid[best])
     if (x > x0).sum() < MIN_SAMPLES_IN_CONTACT:
         return None
-    chi2, gain, level = _cost(x, force, x0, exponent)
-    if gain <= 0:
+    chi2, (_, gain, bend) = _cost(x, force, x0, exponent)
+    depth = float(x.max()) - x0
+    if gain <= 0 or gain + bend * depth <= 0:
         return None
-    # Standard deviation from the Gauss-Newton normal matrix of (level, k, x0).
-    rise = np.maximum(x - x0, 0.0)
-    slope = np.where(rise > 0, gain * exponent * np.maximum(rise, 1e-9 * span) ** (exponent - 1.0), 0.0)
-    jacobian = np.column_stack([np.ones_like(x), rise**exponent, -slope])
+    # Standard deviation from the Gauss-Newton normal matrix of (level, k, k', x0).
+    r = np.maximum(x - x0, 0.0)
+    inside = np.maximum(r, 1e-6 * span)
+    slope = np.where(r > 0, inside ** (exponent - 1.0) * (gain * exponent + bend * (exponent + 1.0) * inside), 0.0)
+    jacobian = np.column_stack([np.ones_like(x), r**exponent, r ** (exponent + 1.0), -slope])
     scale = np.maximum(np.abs(jacobian).max(axis=0), 1e-300)
     normal = (jacobian / scale).T @ (jacobian / scale)
     try:
         covariance = np.linalg.inv(normal) * sigma**2
     except np.linalg.LinAlgError:
         return None
-    std = float(np.sqrt(covariance[2, 2])) / scale[2]
-    return _Fit(x0, std, chi2 / sigma**2, exponent, gain * float(rise.max()) ** exponent)
+    std = float(np.sqrt(max(covariance[3, 3], 0.0))) / scale[3]
+    return _Fit(x0, std, chi2 / sigma**2, exponent, gain * depth**exponent + bend * depth ** (exponent + 1.0))
 
 
-def _cost(x: Array, force: Array, x0: float, exponent: float) -> tuple[float, float, float]:
-    """Sum of squares, k and level of the best line in (x − x0)^n; shape of x and force (n,)."""
-    rise = np.maximum(x - x0, 0.0) ** exponent
-    centred = rise - rise.mean()
-    power = float(centred @ centred)
-    gain = float(centred @ force) / power if power > 0 else 0.0
-    level = float(force.mean() - gain * rise.mean())
-    rest = force - level - gain * rise
-    return float(rest @ rest), gain, level
+def _cost(x: Array, force: Array, x0: float, exponent: float) -> tuple[float, Array]:
+    """Sum of squares and the linear coefficients (level, k, k'); shape of x and force (n,)."""
+    r = np.maximum(x - x0, 0.0)
+    basis = np.column_stack([np.ones_like(x), r**exponent, r ** (exponent + 1.0)])
+    coefficients, *_ = np.linalg.lstsq(basis, force, rcond=None)
+    rest = force - basis @ coefficients
+    return float(rest @ rest), coefficients

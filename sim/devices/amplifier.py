@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal.windows import blackmanharris
 
 from sim.axis import BenchPlant
 from sim.clock import Event, SimClock
@@ -62,7 +61,7 @@ class Amplifier:
         if decimals is None:
             decimals = max(0, min(3, math.floor(math.log10(999_999 / fullest))))
         self.set_decimals(decimals)
-        self.max_counts = min(999_999, round(fullest * 10**decimals))
+        self.max_counts: int = min(999_999, round(fullest * 10**decimals))
         self.min_counts = -self.max_counts
         self.step = 1
         self.filter_level = 0
@@ -87,7 +86,7 @@ class Amplifier:
     def set_decimals(self, decimals: int) -> None:
         """Decimal places of the indication."""
         self.decimals = decimals
-        self._counts_per_N = 10**decimals / self.newtons_per_unit
+        self._counts_per_N: float = 10**decimals / self.newtons_per_unit
 
     def set_filter(self, level: int | None = None, fir: bool | None = None, averaging: int | None = None) -> None:
         """Filter level (FL), mode (FM) and averaging over 2^n values (UR); starts the filter afresh."""
@@ -110,7 +109,7 @@ class Amplifier:
     @property
     def period_s(self) -> float:
         """Time between values."""
-        return self._decimation() * 2**self.averaging / CONVERSIONS_PER_S
+        return self._decimation() * (1 << self.averaging) / CONVERSIONS_PER_S
 
     # -- readings ----------------------------------------------------------------------------------------------
 
@@ -189,8 +188,7 @@ class Amplifier:
         self._summed = 0
         self._history: deque[float] = deque(maxlen=max(1, FIR_TAPS * self.filter_level))
         if self.fir and self.filter_level > 0:
-            window = blackmanharris(FIR_TAPS * self.filter_level)
-            self._weights = window / window.sum()
+            self._weights = _blackman_harris(FIR_TAPS * self.filter_level)
         if self.filter_level > 0:
             single_Hz = CUTOFF_HZ[self.filter_level] / math.sqrt(math.sqrt(2.0) - 1.0)
             self._gain = 1.0 - math.exp(-2.0 * math.pi * single_Hz / CONVERSIONS_PER_S)
@@ -208,7 +206,7 @@ class Amplifier:
         self._since_output = 0
         self._sum += value
         self._summed += 1
-        if self._summed < 2**self.averaging:
+        if self._summed < 1 << self.averaging:
             return
         self._latest = self._sum / self._summed
         self._sum, self._summed = 0.0, 0
@@ -231,3 +229,10 @@ class Amplifier:
         second += self._gain * (first - second)
         self._stages = (first, second)
         return second
+
+
+def _blackman_harris(taps: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """The four-term window, scaled to a sum of 1; shape (taps,)."""
+    angle = 2.0 * np.pi * (np.arange(taps) + 0.5) / taps
+    window = sum(a * np.cos(k * angle) for k, a in enumerate((0.35875, -0.48829, 0.14128, -0.01168)))
+    return np.asarray(window / np.sum(window), dtype=np.float64)

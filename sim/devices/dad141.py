@@ -10,7 +10,8 @@ as seven `u`; a string that is being sent is finished when a command stops the c
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
+from typing import TypeAlias
 
 from sim.clock import Event
 from sim.devices.amplifier import CONVERSIONS_PER_S, Amplifier
@@ -22,6 +23,7 @@ BAUDRATES = (9600, 19200, 38400, 57600, 115200)
 IDENTITY = "D:1410"
 FIRMWARE = "V:0101"
 SERIAL = "S+00147301"
+_Number: TypeAlias = tuple[str, Callable[[], int], Callable[[int], None], Container[int], bool]
 STEPS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
@@ -75,7 +77,11 @@ class Dad141:
         if name in _GETS and (not argument or name == "ON"):
             self._halt_stream()
             form = getattr(self, _GETS[name])
-            self.line.clock.schedule(reply_s, lambda now_s: self._write(form(now_s), now_s))
+
+            def send(now_s: float) -> None:
+                self._write(form(now_s), now_s)
+
+            self.line.clock.schedule(reply_s, send)
             return
         reply = self._reply(name, argument, at_s)
         if reply != "ERR":
@@ -145,7 +151,7 @@ class Dad141:
             "CL": self._close,
         }
 
-    def _number_table(self) -> dict[str, tuple[str, Callable[[], int], Callable[[int], None], object, bool]]:
+    def _number_table(self) -> dict[str, _Number]:
         """By command: form of the report, getter, setter, values allowed, whether an open calibration is needed."""
         amplifier = self.amplifier
         store = self._stored
@@ -153,10 +159,28 @@ class Dad141:
         def attribute(name: str) -> tuple[Callable[[], int], Callable[[int], None]]:
             return (lambda: int(getattr(amplifier, name))), (lambda value: setattr(amplifier, name, value))
 
-        table: dict[str, tuple[str, Callable[[], int], Callable[[int], None], object, bool]] = {
-            "FL": ("F+{:05d}", lambda: amplifier.filter_level, lambda v: amplifier.set_filter(level=v), range(9), False),
-            "FM": ("M+{:05d}", lambda: int(amplifier.fir), lambda v: amplifier.set_filter(fir=bool(v)), range(2), False),
-            "UR": ("U+{:05d}", lambda: amplifier.averaging, lambda v: amplifier.set_filter(averaging=v), range(8), False),
+        table: dict[str, _Number] = {
+            "FL": (
+                "F+{:05d}",
+                lambda: amplifier.filter_level,
+                lambda v: amplifier.set_filter(level=v),
+                range(9),
+                False,
+            ),
+            "FM": (
+                "M+{:05d}",
+                lambda: int(amplifier.fir),
+                lambda v: amplifier.set_filter(fir=bool(v)),
+                range(2),
+                False,
+            ),
+            "UR": (
+                "U+{:05d}",
+                lambda: amplifier.averaging,
+                lambda v: amplifier.set_filter(averaging=v),
+                range(8),
+                False,
+            ),
             "NR": ("R+{:05d}", *attribute("no_motion_counts"), range(1, 65536), False),
             "NT": ("T+{:05d}", *attribute("no_motion_ms"), range(1, 65536), False),
             "DP": ("P+{:05d}", lambda: amplifier.decimals, amplifier.set_decimals, range(6), True),

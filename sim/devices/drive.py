@@ -1,13 +1,13 @@
 """The axis as a device sees it: in its own counts, through its encoder, with its force limits.
 
 A device counts in its own direction and from its own zero; the plant lives in the motor frame (positive into the
-pad). `Drive` converts, adds encoder noise and resolution, and makes force control out of set-points, which the
-plant follows: where a force is commanded, the set-point moves in proportion to the force that is missing. That is
-a gentler, slower force control than a real drive's current loop.
+pad). `Drive` converts, adds encoder noise and resolution, and makes force control out of the set-points that the
+plant follows: to push with a force, the servo is limited to it and sent far beyond what is in its way.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from sim import axis_kernel
@@ -19,8 +19,7 @@ TICK_S = 0.001
 """Period of what a device does by itself: motions of its own making, force control, supervision."""
 
 HARD_STOP_mm_s2 = 20_000.0
-FORCE_GAIN_mm_s_N = 4.0
-"""Speed of the set-point per newton missing; stable against an end stop, where the servo's own stiffness counts."""
+FAR_mm = 1e4
 
 
 class Drive:
@@ -43,6 +42,7 @@ class Drive:
         self.force_limit_N = plant.settings.max_force_N
         self._noise = noise
         self._tick: Event | None = None
+        self._pushing = False
 
     # -- readings ----------------------------------------------------------------------------------------------
 
@@ -69,36 +69,71 @@ class Drive:
 
     # -- commands: each ends what the device was doing by itself -------------------------------------------------
 
-    def stop_ticking(self) -> None:
-        """End a motion of the device's own making; the plant keeps its last set-point."""
+    def take_over(self) -> None:
+        """End a motion of the device's own making; the plant keeps its last set-point, the force its own limit."""
         if self._tick is not None:
             self._tick.cancel()
             self._tick = None
+        if self._pushing:
+            self._pushing = False
+            self._ceiling(self.force_limit_N)
 
     def hold(self, position_mm: float) -> None:
         """Servo on, set-point now (motor frame)."""
-        if self._tick is not None:
-            self.stop_ticking()
+        if self._pushing or self._tick is not None:
+            self.take_over()
         self.plant.hold(position_mm)
 
     def profile(self, target_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> None:
         """A trapezoid to the target (motor frame)."""
-        self.stop_ticking()
+        self.take_over()
         self.plant.profile(target_mm, speed_mm_s, acceleration_mm_s2)
 
     def halt(self, deceleration_mm_s2: float = HARD_STOP_mm_s2) -> None:
         """Decelerate and hold."""
-        self.stop_ticking()
+        self.take_over()
         self.plant.halt(deceleration_mm_s2)
 
     def release(self) -> None:
         """Servo off."""
-        self.stop_ticking()
+        self.take_over()
         self.plant.release()
+
+    def press(self, force_N: float) -> None:
+        """Push with a force (motor frame), whatever moves; 0 is free."""
+        self.take_over()
+        if force_N == 0.0:
+            self.plant.release()
+        else:
+            self.push_with(abs(force_N))
+            self.plant.hold(math.copysign(FAR_mm, force_N))
+
+    def push_with(self, force_N: float) -> None:
+        """Limit the force of the motion under way, until the next command."""
+        self._pushing = True
+        self._ceiling(min(force_N, self.force_limit_N))
+
+    def damp(self, at_s: float, damping_N_s_mm: float) -> None:
+        """Resist motion only. Light damping comes out as half of what the servo's own would be."""
+        self.take_over()
+        plant = self.plant
+        servo = plant.settings
+        own_N_s_mm = 2.0 * servo.damping_ratio * servo.omega * servo.moving_mass_kg / 1000.0
+        mobility_mm_s_N = min(1.0 / damping_N_s_mm, 0.5 / own_N_s_mm)
+        setpoint_mm = plant.position_mm
+        plant.hold(setpoint_mm)
+
+        def act(now_s: float) -> bool:
+            nonlocal setpoint_mm
+            setpoint_mm -= TICK_S * mobility_mm_s_N * plant.motor_force_N
+            plant.hold(setpoint_mm)
+            return True
+
+        self.every_tick(at_s + TICK_S, act)
 
     def every_tick(self, at_s: float, act: Callable[[float], bool]) -> None:
         """Call `act(time)` every millisecond from `at_s` on, until it returns False or another command is given."""
-        self.stop_ticking()
+        self.take_over()
 
         def run(now_s: float) -> None:
             self._tick = None
@@ -108,37 +143,12 @@ class Drive:
 
         self._tick = self.clock.schedule(at_s, run)
 
-    def press(
-        self,
-        at_s: float,
-        force_N: Callable[[], float],
-        gain_mm_s_N: float = FORCE_GAIN_mm_s_N,
-        speed_mm_s: float = 500.0,
-        each: Callable[[float], bool] | None = None,
-    ) -> None:
-        """Control the motor's force (motor frame) to `force_N()`; with 0 N the gain is a damper's reciprocal.
-
-        `each(time)` runs every tick and ends the control where it returns False.
-        """
-        plant = self.plant
-        setpoint_mm = plant.position_mm
-        plant.hold(setpoint_mm)
-
-        def act(now_s: float) -> bool:
-            nonlocal setpoint_mm
-            if each is not None and not each(now_s):
-                return False
-            wanted_mm_s = gain_mm_s_N * (force_N() - plant.motor_force_N)
-            setpoint_mm += TICK_S * min(max(wanted_mm_s, -speed_mm_s), speed_mm_s)
-            low_mm, high_mm = plant.settings.stroke_mm
-            setpoint_mm = min(max(setpoint_mm, low_mm - 0.5), high_mm + 0.5)
-            plant.hold(setpoint_mm)
-            return True
-
-        self.every_tick(at_s + TICK_S, act)
-
     def limit_force(self, force_N: float) -> None:
         """Limit what the motor can push, as a device's own clamp does; never above what the drive can."""
         self.force_limit_N = min(force_N, self.plant.settings.max_force_N)
+        if not self._pushing:
+            self._ceiling(self.force_limit_N)
+
+    def _ceiling(self, force_N: float) -> None:
         # BenchPlant has no call for it: its settings array is what its loop reads.
-        self.plant._s[axis_kernel.MAX_FORCE] = self.force_limit_N
+        self.plant._s[axis_kernel.MAX_FORCE] = force_N

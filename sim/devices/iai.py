@@ -24,6 +24,7 @@ DRG1, DRG2, POSR, POSR2 = 0x0D00, 0x0D01, 0x0D03, 0x9800
 TABLE, TABLE_ROWS, ROW = 0x1000, 64, 16
 PCMD, INP, VCMD, ACMD, PPOW, CTLF = 0x9900, 0x9902, 0x9904, 0x9906, 0x9907, 0x9908
 BLOCK_END = 0x9909
+TARGET_RANGE = 999_999
 COIL_DRG1, COIL_DRG2, CLBR, PMSL, STOP = 0x0400, 0x0410, 0x0426, 0x0427, 0x042C
 SON, ALRS, BKRL, STP, HOME, CSTR = 1 << 12, 1 << 8, 1 << 7, 1 << 5, 1 << 4, 1 << 3
 JOG_PLUS, JOG_MINUS = 1 << 9, 1 << 8
@@ -135,7 +136,11 @@ class Iai(RegisterAxis):
             raise Refusal(ILLEGAL_ADDRESS)
 
     def write_registers(self, address: int, values: list[int], at_s: float) -> None:
-        """As any store, but edges of DRG1 and DRG2 count against what they were."""
+        """As any store, but edges of DRG1 and DRG2 count against what they were, and targets have a range."""
+        if address == PCMD and len(values) >= 2:
+            target = struct.unpack(">i", struct.pack(">HH", *values[:2]))[0]
+            if abs(target) > TARGET_RANGE:
+                raise Refusal(ILLEGAL_VALUE)
         old = {register: self.values[register] for register in (DRG1, DRG2)}
         super().write_registers(address, values, at_s)
         for register, before in old.items():
@@ -145,8 +150,6 @@ class Iai(RegisterAxis):
     def written(self, addresses: range, at_s: float) -> None:
         """The 9900 block and POSR2 act when written."""
         self.drive.plant.advance(at_s)
-        if PCMD in addresses and abs(self.signed(PCMD)) > 999_999:
-            raise Refusal(ILLEGAL_VALUE)
         if not self.modbus_commands:
             return
         if PCMD in addresses or PCMD + 1 in addresses:

@@ -14,7 +14,7 @@ import struct
 
 from sim.clock import Event
 from sim.devices import orca_registers as r
-from sim.devices.drive import FORCE_GAIN_mm_s_N, Drive
+from sim.devices.drive import Drive
 from sim.devices.modbus import ILLEGAL_ADDRESS, ILLEGAL_VALUE, Refusal, RtuServer, standard_functions
 from sim.devices.orca_motion import AutoZero, Kinematics
 from sim.line import Line
@@ -104,6 +104,7 @@ class Orca:
         """Position µm, force mN, power W, temperature °C, voltage mV, errors."""
         self.plant.advance(at_s)
         force_mN = self._sensed_force_mN()
+        self._check_force(force_mN)
         power_W = int(2e-8 * force_mN * force_mN)
         return self.drive.counts(), force_mN, power_W, r.BOARD_TEMPERATURE_C, r.VOLTAGE_mV, self.errors
 
@@ -200,8 +201,8 @@ class Orca:
         """Bring the status registers up to date."""
         self.plant.advance(at_s)
         registers, server = self.registers, self.server
-        self._check_force()
         force_mN = self._sensed_force_mN()
+        self._check_force(force_mN)
         for place, value in (
             (r.POS_CURSOR, round(self.drive.direction * (self.plant.setpoint_mm - self.drive.zero_mm) * 1000.0)),
             (r.SHAFT_POS_UM, self.drive.counts()),
@@ -241,6 +242,8 @@ class Orca:
             return
         self.kinematics.cancel()
         self.auto_zero.cancel()
+        if self.mode == r.FORCE_MODE and mode != r.FORCE_MODE:
+            self.drive.hold(self.plant.position_mm)  # its set-point is where the force would take it
         self.mode = mode
         if mode in (r.SLEEP, r.HAPTIC):
             self.drive.release()
@@ -268,15 +271,13 @@ class Orca:
     def _commanded(self, at_s: float, entering: bool = False) -> None:
         """A force or position command has come, or its mode was entered."""
         self._last_command_s = at_s
-        self._check_force()
         if self.errors & _STOPPING:
             if entering:
                 self.drive.release()
             return
         self.plant.advance(at_s)
         if self.mode == r.FORCE_MODE:
-            if entering:
-                self.drive.press(at_s, self._force_command_N)
+            self.drive.press(self._force_command_N())
             return
         target_mm = self.drive.plant_mm(r.wide(self.registers, r.POS_CMD))
         speed, acceleration = self.registers[r.POS_MAX_VEL], self.registers[r.POS_MAX_ACCEL]
@@ -304,9 +305,9 @@ class Orca:
         self.errors |= bit
         self.latched |= bit
 
-    def _check_force(self) -> None:
+    def _check_force(self, force_mN: int) -> None:
         """Max force: while the motor pushes as hard as the user's limit lets it."""
-        at_limit = abs(self.plant.motor_force_N) * 1000.0 >= self._limit_mN - 1.0
+        at_limit = abs(force_mN) >= self._limit_mN - 1
         if at_limit or self.errors & r.MAX_FORCE:
             self._set(r.MAX_FORCE, at_limit)
 
@@ -326,8 +327,8 @@ class Orca:
             return
         self.plant.advance(at_s)
         self._raise(r.COMMS_TIMEOUT)
-        damping = self.registers[r.SAFETY_DGAIN] * 1e-3
-        if damping:
-            self.drive.press(at_s, lambda: 0.0, gain_mm_s_N=min(FORCE_GAIN_mm_s_N, 1.0 / damping))
+        damping_N_s_mm = self.registers[r.SAFETY_DGAIN] * 1e-3
+        if damping_N_s_mm:
+            self.drive.damp(at_s, damping_N_s_mm)
         else:
             self.drive.release()

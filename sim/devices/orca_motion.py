@@ -78,7 +78,7 @@ class AutoZero:
         speed_mm_s = max(1.0, float(self.registers[r.AUTO_ZERO_SPEED_MMPS]))
         position_mm = drive.plant.position_mm
         give_up_s = at_s + AUTO_ZERO_TIMEOUT_S
-        drive.plant.hold(position_mm)
+        drive.hold(position_mm)
         self.complete = False
         self.running = True
 

@@ -83,6 +83,8 @@ def power_up_values(baudrate: int, delay_us: int, address: int, max_force_mN: in
     registers[BOARD_TEMP] = registers[COIL_TEMP] = BOARD_TEMPERATURE_C
     registers[VDD_FINAL] = VOLTAGE_mV
     registers[MAJOR_VERSION], registers[RELEASE_STATE], registers[REVISION_NUMBER] = 7, 2, 2
+    for motion in range(32):
+        registers[KIN_MOTION_0 + 6 * motion + 2] = 1000  # ms
     registers[MB_IF_DELAY] = delay_us
     registers[MB_ADDRESS] = address
     return registers

@@ -12,6 +12,7 @@ from sim.devices.modbus import ILLEGAL_ADDRESS, Refusal
 G_mm_s2 = 9806.65
 HOMING_mm_s = 20.0
 PUSHING_mm_s = 20.0
+REACHED_mm = 0.005
 PUSH_SETTLE_S = 0.255
 """A push counts as done when the force has been there for so long."""
 
@@ -156,19 +157,20 @@ class Mover:
 
         def feel(now_s: float) -> bool:
             nonlocal reached_s
+            self.drive.push_with(self.push_N)
             if sign * self.plant.motor_force_N < 0.9 * self.push_N:
                 reached_s = now_s
             self.pushed = self.pushed or now_s - reached_s >= PUSH_SETTLE_S
-            if sign * (self.plant.position_mm - target_mm) < abs(stroke_mm):
+            if sign * (self.plant.position_mm - target_mm) < abs(stroke_mm) - REACHED_mm:
                 return True
             self.pushing, self.missed = False, True
-            self.plant.halt(acceleration_mm_s2)
             return False
 
         def wait(now_s: float) -> bool:
             if self.plant.moving:
                 return True
-            self.drive.press(now_s, lambda: sign * self.push_N, speed_mm_s=min(speed_mm_s, PUSHING_mm_s), each=feel)
+            self.drive.every_tick(now_s, feel)
+            self.plant.profile(target_mm + stroke_mm, min(speed_mm_s, PUSHING_mm_s), acceleration_mm_s2)
             return False
 
         self.drive.every_tick(at_s, wait)
@@ -198,7 +200,9 @@ class Mover:
             self.drive.profile(self.target_mm, speed_mm_s, acceleration_mm_s2)
 
     def _forget(self) -> None:
-        self.drive.stop_ticking()
+        self.drive.take_over()
+        if self.pushing:  # the set-point is ahead, behind what is in the way
+            self.drive.hold(self.plant.position_mm)
         self.target_mm = None
         self.homing = self.pushing = self.pushed = self.missed = False
 

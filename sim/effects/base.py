@@ -18,8 +18,9 @@ parameters and supplies steps (sim.jit.block) for one or several places:
 | sampling | force → force as reported, N | chained, once a force sample |
 
 All blocks of one effect share one state vector, which starts as `state`, and one parameter vector: the form's
-parameters in their order, or what `pack` makes of them. A step from `frame` to `gap` is run several times on trial copies
-of the state, so it may keep nothing elsewhere. A step must take dt = 0 (the first sample of all, and stamps that repeat).
+parameters in their order, or what `pack` makes of them. A step from `frame` to `gap` is run several times on trial
+copies of the state, so it may keep nothing elsewhere. A step must take dt = 0 (the first sample of all, and stamps that
+repeat).
 """
 
 from __future__ import annotations

@@ -76,9 +76,8 @@ def test_the_pad_is_relative_to_the_bench_file(tmp_path: Path) -> None:
 def test_a_register_map_is_read_beside_the_bench_file(tmp_path: Path) -> None:
     text = REAL.replace("driver: dad141,", "driver: registers, map: amp.yaml,")
     assert "there is no file `amp.yaml`" in refused(tmp_path, text).message
-    (tmp_path / "amp.yaml").write_text(
-        "name: amp\ndevice: load_cell\nblocks: {all: {address: 0x10, count: 2}}\nvalues: {gross: {address: 0x10, type: f32}}\n"
-    )
+    head = "name: amp\ndevice: load_cell\nblocks: {all: {address: 0x10, count: 2}}\n"
+    (tmp_path / "amp.yaml").write_text(head + "values: {gross: {address: 0x10, type: f32}}\n")
     assert load_bench(bench_file(tmp_path, text)).load_cell.map == {
         "name": "amp",
         "device": "load_cell",
@@ -95,14 +94,24 @@ def test_a_register_map_is_read_beside_the_bench_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "at", "words"),
     [
-        ("position: [-5, 6]", "position: [-25, 6]", "[-25, 6]", "limits.position: [-25, 6] reaches beyond motor.stroke [-20, 20]"),
+        (
+            "position: [-5, 6]",
+            "position: [-25, 6]",
+            "[-25, 6]",
+            "limits.position: [-25, 6] reaches beyond motor.stroke [-20, 20]",
+        ),
         ("position: [-5, 6]", "position: [6, -5]", "[6, -5]", "limits.position: the first (6) must be less"),
         ("force: 20", "force: 60", "60", "limits.force: 60 N is beyond load_cell.capacity 50 N"),
         ("tension: 5", "tension: 70", "70", "limits.tension: 70 N is beyond load_cell.capacity 50 N"),
         ("stroke: [", "max_speed: 100, stroke: [", "200, acc", "limits.speed: 200 is more than motor.max_speed 100"),
         ("driver: orca", "driver: orka", "orka", "did you mean 'orca'"),
         ("safe_state: hold", "safe_state: fall", "fall", "must be `release`, `hold` or `retract`"),
-        ("port: /dev/ttyUSB0", "port: sim://a/motor", "sim://", "motor.port: is simulated, but there is no `simulation`"),
+        (
+            "port: /dev/ttyUSB0",
+            "port: sim://a/motor",
+            "sim://",
+            "motor.port: is simulated, but there is no `simulation`",
+        ),
         ("capacity: 50", "capacity: -50", "-50", "load_cell.capacity: must be > 0, not -50"),
         ("speed: 200", "sped: 200", "sped", "limits.sped: unknown key"),
         ("force_delay: 0.002", "force_delay: 2", "2, mea", "timing.force_delay: must be < 1, not 2"),

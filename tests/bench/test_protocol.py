@@ -99,31 +99,49 @@ def test_numbers_as_names_of_samples() -> None:
         (steps("{block: a/b, steps: [{to: 1, speed: 1}]}"), "p.yaml:3:13", "is no name"),
         (
             steps("{block: a, repeat: 400, steps: [{block: b, repeat: 400, steps: [{to: 1, speed: 1}]}]}"),
-            "p.yaml:3:57",
+            "p.yaml:3:56",
             "steps[0].steps[0].repeat: the steps are more than 100000",
         ),
-        (steps("{to: 4, speed: 1}", head="name: p\nlimits: {depth: 3}\n"), "p.yaml:4:10", "4 mm is beyond limits.depth 3"),
+        (
+            steps("{to: 4, speed: 1}", head="name: p\nlimits: {depth: 3}\n"),
+            "p.yaml:4:10",
+            "4 mm is beyond limits.depth 3",
+        ),
         (
             steps("{block: a, steps: [{to_force: 9, speed: 1}]}", head="name: p\nlimits: {force: 8}\n"),
             "p.yaml:4:35",
             "steps[0].steps[0].to_force: 9 N is beyond limits.force 8 N",
         ),
-        (steps("{to: 1, speed: 1}", head="name: p\napproach: none at all\n"), "p.yaml:2:11", "approach: must be `none`"),
-        (steps("{to: 1, speed: 1}", head="name: p\napproach: {sped: 1}\n"), "p.yaml:2:12", "approach.sped: unknown key"),
+        (
+            steps("{to: 1, speed: 1}", head="name: p\napproach: none at all\n"),
+            "p.yaml:2:11",
+            "approach: must be `none`",
+        ),
+        (
+            steps("{to: 1, speed: 1}", head="name: p\napproach: {sped: 1}\n"),
+            "p.yaml:2:12",
+            "approach.sped: unknown key",
+        ),
         (
             steps("{to: 1, speed: 1}", head="name: p\napproach: {force: 2}\nlimits: {force: 1}\n"),
             "p.yaml:2:19",
             "approach.force: 2 N is not under limits.force 1 N",
         ),
         (
-            steps("{to: 1, speed: 1}", head="name: p\nprecondition: {to: 4, speed: 1, cycles: 1}\nlimits: {depth: 3}\n"),
+            steps(
+                "{to: 1, speed: 1}", head="name: p\nprecondition: {to: 4, speed: 1, cycles: 1}\nlimits: {depth: 3}\n"
+            ),
             "p.yaml:2:20",
             "precondition.to: 4 mm is beyond",
         ),
         (steps("{to_force: 1, speed: 1}", head="name: p\napproach: none\n"), "p.yaml:4:16", "nothing to press"),
         (steps("{to: 1, speed: 1}", head="name: p\njerk: 5\n"), "p.yaml:2:7", "jerk: only an s_curve has a jerk"),
         (steps("{to: 1, speed: 1}", head="name: ../p\n"), "p.yaml:1:7", "name: the word `../p` is no name"),
-        (steps("{to: 1, speed: 1}", head="name: p\nsample: {thickness: 0}\n"), "p.yaml:2:21", "sample.thickness: must be > 0"),
+        (
+            steps("{to: 1, speed: 1}", head="name: p\nsample: {thickness: 0}\n"),
+            "p.yaml:2:21",
+            "sample.thickness: must be > 0",
+        ),
     ],
 )
 def test_what_is_refused_is_named_with_its_place(text: str, place: str, words: str) -> None:
@@ -133,9 +151,10 @@ def test_what_is_refused_is_named_with_its_place(text: str, place: str, words: s
     assert caught.value.place == place
 
 
-def test_a_missing_file_suggests_the_nearest_shipped_name() -> None:
+@pytest.mark.parametrize("name", ["stairs-case", "stair", "staircase.yml", "protocols/Staircase.yaml"])
+def test_a_missing_file_suggests_the_nearest_shipped_name(name: str) -> None:
     with pytest.raises(InputError, match="did you mean `staircase`") as caught:
-        load_protocol("stairs-case")
+        load_protocol(name)
     assert caught.value.status == 2
 
 

@@ -58,7 +58,8 @@ def test_small_aliases_are_welcome() -> None:
 
 
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
-    f"{b}: &{b} [*{a}, *{a}, *{a}, *{a}, *{a}, *{a}, *{a}, *{a}, *{a}]\n" for a, b in zip("abcdef", "bcdefg", strict=True)
+    f"{b}: &{b} [*{a}, *{a}, *{a}, *{a}, *{a}, *{a}, *{a}, *{a}, *{a}]\n"
+    for a, b in zip("abcdef", "bcdefg", strict=True)
 )
 
 
@@ -85,7 +86,8 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
         ('a: "\\ud800"', "x.yaml:1:4", "half of a character"),
         ("[" * 5000, "x.yaml:1:51", "nested more than 50 deep"),
         ("a: &a [*a]", "x.yaml:1:4", "nested more than 50 deep"),
-        (BOMB, "x.yaml:1:", "more than 100000 values"),
+        ("a: [" + "1, " * 40_000 + "1]", "x.yaml:1:", "more than 30000 values"),
+        (BOMB, "x.yaml:1:", "more than 30000 values"),
         ('a: "\\UFFFFFFFF"', "x.yaml", "not valid YAML"),
     ],
 )
@@ -143,7 +145,12 @@ def complaint(text: str) -> InputError:
         ("name: a\nparts:\n  - {speeed: 1}\n", "x.yaml:3:6", "parts[0].speeed: unknown key", "did you mean `speed`?"),
         ("name: a\nparts:\n  - {count: 1}\n", "x.yaml:3:5", "parts[0].speed: is missing", ""),
         ("name: a\nparts: []\nrnage: [0, 1]\n", "x.yaml:3:1", "rnage: unknown key", "did you mean `range`?"),
-        ("name: a\nparts: [{speed: fast}]\n", "x.yaml:2:17", "parts[0].speed: must be a number, not the word `fast`", ""),
+        (
+            "name: a\nparts: [{speed: fast}]\n",
+            "x.yaml:2:17",
+            "parts[0].speed: must be a number, not the word `fast`",
+            "",
+        ),
         ("name: a\nparts: [{speed: '5'}]\n", "x.yaml:2:17", "must be a number, not the word `5`", ""),
         ("name: a\nparts: [{speed: true}]\n", "x.yaml:2:17", "must be a number, not true", ""),
         ("name: a\nparts: [{speed: nan}]\n", "x.yaml:2:17", "must be a number, not the word `nan`", ""),

@@ -1,4 +1,4 @@
-"""The wire, scripted: a port that must be sent exactly these bytes and gives exactly those, on a clock that only waits."""
+"""The wire, scripted: a port that must be sent exactly these bytes and gives exactly those, on a clock that waits."""
 
 from __future__ import annotations
 

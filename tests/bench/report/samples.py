@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from bench.recording.types import Event, ForceChannel, MotorChannel, Recording, StepMark
 from bench.report import Curve, Evidence, FitView
@@ -49,18 +50,15 @@ def elastic(depth: Array) -> Array:
 
 
 def response(t: Array, depth: Array) -> Array:
-    """Force of the pad, F^e linear between samples (bonded)."""
+    """Force of the pad on an even grid, F^e linear between samples (bonded)."""
     f = elastic(depth)
-    dt, df = np.diff(t), np.diff(f)
+    dt = float(t[1] - t[0])
+    rise = np.diff(f, prepend=f[0]) / dt
     total = SHARES[0] * f
     for c, nu in zip(SHARES[1:], RATES[1:], strict=True):
-        state, out = 0.0, np.zeros_like(f)
         decay = np.exp(-nu * dt)
-        for i, (e, rise) in enumerate(zip(decay, df / dt, strict=True)):
-            state = e * state + c * rise * (1.0 - e) / nu
-            out[i + 1] = state
-        total = total + out
-    return total
+        total = total + lfilter([c * (1.0 - decay) / nu], [1.0, -decay], rise)
+    return np.asarray(total)
 
 
 def recording(rate_Hz: float = 1000.0, force_rate_Hz: float = 550.0, seed: int = 1, **changes: Any) -> Recording:
@@ -74,7 +72,7 @@ def recording(rate_Hz: float = 1000.0, force_rate_Hz: float = 550.0, seed: int =
     clean = np.interp(ft, t, response(t, actual))
     net = clean + NOISE * random.standard_normal(ft.size) + 0.04 * np.sin(0.25 * ft)
     first = Recording(
-        source=Path("runs/2026-11-21_0950_staircase/recording.mcap"),
+        source=Path("runs/2026-11-21_095012_staircase/recording.mcap"),
         motor=MotorChannel(
             t,
             actual + SURFACE + 0.0005 * random.standard_normal(t.size),
@@ -84,9 +82,9 @@ def recording(rate_Hz: float = 1000.0, force_rate_Hz: float = 550.0, seed: int =
         ),
         load_cell=ForceChannel(ft, net, net + 0.31, ft + 0.0012, np.zeros(ft.size, dtype=bool)),
         events=[
-            Event(0.0, "home", {"position_mm": 0.0}),
-            Event(1.9, "tare", {"gross_N": 0.3104, "noise_N": 0.0121, "samples": 1045}),
-            Event(2.75, "touch_off", {"surface_mm": SURFACE, "std_mm": 0.0031, "threshold_N": 0.06}),
+            Event(0.0, "homed", {}),
+            Event(1.9, "tare", {"tare_N": 0.3104, "sigma_N": 0.0121, "samples": 1045}),
+            Event(2.75, "touch_off", {"surface_mm": SURFACE, "surface_std_mm": 0.0031, "threshold_N": 0.06}),
             *(Event(5.0 + 0.01 * i, "retry", {"device": "motor"}) for i in range(7)),
         ],
         steps=marks,
@@ -94,18 +92,18 @@ def recording(rate_Hz: float = 1000.0, force_rate_Hz: float = 550.0, seed: int =
         surface_std_mm=0.0031,
         run={
             "protocol": "staircase",
-            "sample": "PU-07",
+            "sample": '{"id":"PU-07","thickness_mm":10}',
             "operator": "K. Ito",
             "note": "second day, after a night at rest",
             "conditions": '{"temperature_C": 23.1, "humidity_percent": 41}',
             "bench": "simulated",
             "seed": "1",
             "simulated": "true",
-            "started": "2026-11-21T09:50:12+01:00",
+            "epoch_ns": "946684800000000000",
             "protocol_sha256": "5e1f",
         },
         result={
-            "status": "finished",
+            "status": "done",
             "traffic": '{"motor": {"exchanges": 43000, "retries": 7, "crc_errors": 0},'
             ' "load_cell": {"exchanges": 12, "retries": 0, "lines": 23650}}',
             "overruns": "3",

@@ -66,3 +66,8 @@ def test_escaping_and_cutting() -> None:
 
 def test_a_column_shares_its_decimals() -> None:
     assert markup.column([118.0, 30.7, 0.0, math.nan]) == ["118.0", "30.7", "0.0", "–"]
+
+
+def test_powers_are_raised() -> None:
+    assert markup.raised("N/mm^2") == "N/mm²"
+    assert markup.raised("mm^-1") == "mm⁻¹"

@@ -89,7 +89,7 @@ def test_a_stopped_run_shows_its_first_cause(run: Recording) -> None:
     words = check(page).shown
     assert "The run was stopped before its protocol ended" in words
     assert "First cause: force 20.4 N over the limit of 20 N in steps[3]" in words
-    assert "No model was fitted" in words and "steps[3] was not finished" in words
+    assert "No model was fitted" in words and "Steps[3] was not finished." in words
     assert 'class="verdict bad"' in page
 
 
@@ -187,7 +187,7 @@ def nothing(n: int = 0, **changes: object) -> Recording:
 @pytest.mark.parametrize("surface", [None, 0.0])
 def test_next_to_no_data_still_makes_a_page(n: int, surface: float | None) -> None:
     words = check(report_page(nothing(n, surface_mm=surface), None, fit_problem="no sample")).shown
-    assert "data.csv" in words and "no sample" in words
+    assert "data.csv" in words and "No sample." in words
     assert "unfinished" not in words  # a file of data is no run of ours
 
 
@@ -241,3 +241,31 @@ def test_the_fastest_ramp_is_found_with_and_without_marks(run: Recording) -> Non
     fast = [(a, b) for a, b, v in zip(t[:-1], t[1:], speeds, strict=True) if v > 79.0]
     middle = (unmarked[0] + unmarked[1]) / 2
     assert any(a < middle < b + 0.003 for a, b in fast)
+
+
+def test_the_date_comes_from_host_folder_or_a_real_clock(run: Recording) -> None:
+    from bench.report.facts import started
+
+    assert started(run, {"started": "2026-11-21T09:51:00+01:00"}) == "2026-11-21 09:51:00+01:00"
+    assert started(run) == "2026-11-21 09:50:12"
+    elsewhere = dataclasses.replace(run, source=Path("/data/a/recording.mcap"))
+    assert started(elsewhere) == ""  # the epoch of a virtual clock is no date
+    real = dataclasses.replace(elsewhere, run={"simulated": "false", "epoch_ns": "946684800000000000"})
+    assert started(real) == "2000-01-01 00:00:00 UTC"
+
+
+def test_an_air_run_speaks_of_no_surface(run: Recording) -> None:
+    air = dataclasses.replace(
+        run, surface_mm=0.0, surface_std_mm=0.0, events=[Event(0.1, "no_surface", {"surface_mm": 0.0})]
+    )
+    seen = check(report_page(air, None, fit_problem="there was no pad (air run)"))
+    assert "No surface was looked for" in seen.shown
+    assert "motor position, mm" in seen.words and "depth, mm" not in seen.words and "pad surface" not in seen.words
+
+
+def test_structures_are_ranked_and_the_far_ones_folded(run: Recording) -> None:
+    rows = [Evidence(f"law{i}", 1 + i % 3, 0.1 + i, criterion=float(100 - i), chosen=i == 0) for i in range(30)]
+    words = check(report_page(run, dataclasses.replace(samples.fit(run), evidence=rows))).shown
+    shown = words[words.index("Structures tried law order") : words.index("21 further structures")]
+    assert "law29 3 29.1" in shown and "chosen" in shown and "law15" not in shown
+    assert shown.index("law29") < shown.index("law28") < shown.index("law0")
