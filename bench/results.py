@@ -81,9 +81,11 @@ def fit_lines(fit: FitResult) -> list[str]:
 
 
 def _fit_of(recording: Recording) -> tuple[FitResult | None, str]:
+    if any(event.name == "no_surface" for event in recording.events):
+        return None, "there was no pad (air run)"
     if recording.surface_mm is None:
         stopped = recording.result is None or recording.result.get("status") != "done"
-        return None, "the run ended before the pad's surface was found" if stopped else "there was no pad (air run)"
+        return None, "the run ended before the pad's surface was found" if stopped else "no surface was found"
     try:
         return identify.fit(recording.measurement()), ""
     except InputError as error:

@@ -43,6 +43,9 @@ FAST_BAUDRATE = 625_000
 TURNAROUND_S = 0.025
 """Longest wait for the beginning of a reply: what the vendor's SDK waits for a whole one."""
 
+STREAM_TURNAROUND_S = 0.020
+"""The same for the stream: the SDK's response time-out there."""
+
 POLL_S = 0.005
 SETTLE_S = 0.5
 """How long a change of mode may take until it reads back."""
@@ -88,7 +91,7 @@ class Orca:
         self._commanding = False
         self._last: MotorSample | None = None
         self._length: Callable[[bytearray], int] = self._modbus.rtu_length(STREAM, STREAM_REPLY_SIZE, b"")
-        self._timeout_s = TURNAROUND_S + link.wire_s(STREAM_REPLY_SIZE)
+        self._timeout_s = STREAM_TURNAROUND_S + link.wire_s(STREAM_REPLY_SIZE)
         self._middle_offset_s = 0.5 * (link.wire_s(9) - link.wire_s(STREAM_REPLY_SIZE))
 
     # -- identity and clamps -----------------------------------------------------------------------------------
@@ -197,8 +200,8 @@ class Orca:
         if last is None or self.link.clock.now() - last.received_s > FRESH_S:
             last = yield self.read()
         # The first command brakes it, the second takes it to where it was when the brake took hold.
-        sample = yield self.stream(last.position_mm)
-        yield self.stream(sample.position_mm)
+        sample = yield self._command(last.position_mm, repeatable=True)
+        yield self._command(sample.position_mm, repeatable=True)
 
     def safe_state(self, state: SafeState) -> Steps[dict[str, Any]]:
         """release: asleep, no force. hold (and retract, once the bench has retracted): position mode where it is.
@@ -226,7 +229,7 @@ class Orca:
 
     def _hold_here(self) -> Steps[None]:
         sample = yield self.read()
-        sample = yield self.stream(sample.position_mm)
+        sample = yield self._command(sample.position_mm, repeatable=True)
         yield from self._await_mode(Mode.POSITION)
         if sample.fault:
             raise self._fault(sample.fault, "does not hold its position")
@@ -268,10 +271,17 @@ class Orca:
         return self._modbus.sample_registers("holding", _BLOCK, _BLOCK_COUNT, convert)
 
     def stream(self, position_mm: float) -> Exchange[MotorSample]:
-        """Command a position (rounded to 1 µm) and take a sample."""
+        """Command a position (rounded to 1 µm) and take a sample.
+
+        Not repeated when its reply is lost: an old set-point sent again would pull the axis back, and the next one
+        is on its way.
+        """
+        return self._command(position_mm, repeatable=False)
+
+    def _command(self, position_mm: float, *, repeatable: bool) -> Exchange[MotorSample]:
         self._commanding = True
         frame = command_frame(self.address, Command.POSITION, round(position_mm * self._um_per_mm))
-        return Exchange("stream", frame, self._length, self._parse_stream, self._timeout_s)
+        return Exchange("stream", frame, self._length, self._parse_stream, self._timeout_s, repeatable)
 
     def move(self, target_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> Steps[None]:
         """Not with this motor: it follows a stream of positions; raises `DriverError`."""

@@ -10,7 +10,7 @@ from drivers.modbus import ModbusClient
 from drivers.registers import HOST_SLACK_S
 from drivers.regmap import LoadCellMap
 from drivers.sequence import Signals
-from drivers.wire import Exchange, Link, Steps
+from drivers.wire import Exchange, Link, Pause, Steps
 
 PLAUSIBLE = (1e-12, 1e12)
 """A reading that is not zero and lies outside of this has its words in the wrong order."""
@@ -85,10 +85,11 @@ class RegisterLoadCell:
         return samples
 
     def stop(self) -> Steps[None]:
-        """Poll no more; the device only ever answers."""
+        """Poll no more, and let the last poll be answered."""
         self._next_poll_s = None
+        while self._poll is not None and not self._poll.done:
+            yield Pause(0.001)
         self._poll = None
-        yield from ()
 
     def latency_s(self) -> float:
         """Poll interval, and the exchange on the wire."""

@@ -327,10 +327,11 @@ class LoadCellMap(_DeviceMap):
 
 
 def load_map(driver: str, source: str | dict[str, Any] | None, device: Literal["motor", "load_cell"]) -> Any:
-    """The map for a driver name: a shipped one, with keys of `source` in place of its own, or `source` itself.
+    """The map for a driver name: a shipped one with what `source` says otherwise, or `source` itself.
 
-    `source` may be a file's path. Returns a `MotorMap` or a `LoadCellMap`. Raises `OSError` for a file that cannot be
-    read and `ValueError` (pydantic's, or a YAML reader's) for a map that cannot be used.
+    `source` may be a file's path. Laid over a shipped map, its mappings are merged, lists and numbers replaced.
+    Returns a `MotorMap` or a `LoadCellMap`. Raises `OSError` for a file that cannot be read and `ValueError`
+    (pydantic's, or a YAML reader's) for a map that cannot be used.
     """
     if isinstance(source, str):
         from pathlib import Path
@@ -344,6 +345,12 @@ def load_map(driver: str, source: str | dict[str, Any] | None, device: Literal["
     else:
         content = dict(source or {})
     if driver != "registers":
-        content = {**shipped_map(driver), **content}
+        content = _merged(shipped_map(driver), content)
     kind: type[_DeviceMap] = MotorMap if device == "motor" else LoadCellMap
     return kind.model_validate(content)
+
+
+def _merged(base: Any, over: Any) -> Any:
+    if not (isinstance(base, dict) and isinstance(over, dict)):
+        return over
+    return {**base, **{key: _merged(base[key], value) if key in base else value for key, value in over.items()}}

@@ -10,7 +10,6 @@ never delays the others. Drivers describe longer conversations as generators of 
 from __future__ import annotations
 
 import contextlib
-import os
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
@@ -19,6 +18,9 @@ from typing import Any, Generic, Protocol, TypeAlias, TypeVar
 import serial
 
 from drivers.errors import DeviceTimeout, DriverError, FrameError, PortError
+from drivers.port import Port as Port
+from drivers.port import open_port as open_port
+from drivers.port import raw_io
 
 T = TypeVar("T")
 
@@ -34,22 +36,6 @@ READ_SIZE = 4096
 SILENT_CHECK_S = 0.25
 """A port that gives nothing for so long is asked whether it is still there: a terminal that was unplugged reads as
 silent for ever."""
-
-
-class Port(Protocol):
-    """What is used of a pyserial port (`sim://`, pseudo-terminals and `socket://` included)."""
-
-    def read(self, size: int = 1, /) -> bytes:
-        """Bytes that are there, at most `size`; the port is opened with timeout 0."""
-        ...
-
-    def write(self, data: bytes, /) -> int | None:
-        """Queue bytes for sending."""
-        ...
-
-    def close(self) -> None:
-        """Close the port."""
-        ...
 
 
 class Clock(Protocol):
@@ -173,7 +159,7 @@ class Link:
         self._free_at_s = 0.0
         self._quiet_limit_s = 0.0
         self._check_at_s = 0.0
-        self._read, self._write = _raw_io(port)
+        self._read, self._write = raw_io(port)
 
     def wire_s(self, byte_count: int) -> float:
         """Time that so many bytes take on the wire, seconds."""
@@ -384,46 +370,3 @@ def _serve(links: Sequence[Link], until_s: float, exchange: Exchange[Any] | None
         clock.wait(ports, min([until_s, *(link.wake_at() for link in links)]))
         for link in links:
             link.service()
-
-
-def open_port(device: str, url: str, baudrate: int, *, parity: str = "N", stopbits: int = 1) -> Port:
-    """Open a serial device or any URL pyserial knows (`sim://…`, `socket://…`), exclusively and non-blocking.
-
-    Pseudo-terminals have no parity: where the kernel refuses it there, the port is opened without.
-    Raises `PortError` that names the port and the cure.
-    """
-    options: dict[str, Any] = {"baudrate": baudrate, "stopbits": stopbits, "timeout": 0}
-    if "://" not in url:
-        options["exclusive"] = True
-    try:
-        if url.startswith("/dev/pts/"):
-            parity = "N"
-        port = serial.serial_for_url(url, parity=parity, **options)
-    except (OSError, ValueError, serial.SerialException) as error:
-        raise PortError(device, f"cannot open port {url!r}: {error}; check 'port' in the bench file") from error
-    if hasattr(port, "set_low_latency_mode"):
-        # USB adapters hold bytes back for up to 16 ms otherwise; ports without the ioctl say so with an error.
-        with contextlib.suppress(OSError, ValueError, NotImplementedError):
-            port.set_low_latency_mode(True)
-    return port
-
-
-def _raw_io(port: Port) -> tuple[Callable[[int], bytes], Callable[[bytes], int | None]]:
-    """Read and write functions of a port; a POSIX terminal is used by its descriptor (30 µs saved a call)."""
-    fd = getattr(port, "fd", None)
-    if not isinstance(fd, int):
-        return port.read, port.write
-
-    def read(size: int) -> bytes:
-        try:
-            return os.read(fd, size)
-        except BlockingIOError:
-            return b""
-
-    def write(data: bytes) -> int:
-        sent = os.write(fd, data)
-        while sent < len(data):
-            sent += os.write(fd, data[sent:])
-        return sent
-
-    return read, write

@@ -20,7 +20,7 @@ from sim.clock import SimClock
 from sim.line import Line
 from sim.world import Endpoint, World, WorldSettings
 
-POLL_AFTER_REQUEST_S = 0.003
+POLL_AFTER_REQUEST_S = 0.0
 LOOK_UP_S = 0.2
 
 

@@ -66,6 +66,8 @@ def relaxation_of(
     reasons = [reason for mode in modes if (reason := _fault(mode, tolerance))]
     if c_0.share < -tolerance - c_0.doubt:
         reasons.append(f"a held force would end below 0 (static gain {c_0.share:.4g})")
+    elif c_0.share > filter.b[0] + tolerance + c_0.doubt:
+        reasons.append(f"a held force would grow in the end (static gain {c_0.share:.4g}, at first {filter.b[0]:.4g})")
     if reasons:
         raise NotARelaxation(tuple(reasons))
     found = sorted((_mode(mode, T, hold) for mode in modes), key=lambda pair: -pair[1])
@@ -90,7 +92,7 @@ def is_relaxation(
 
 
 def _mode(mode: _Mode, T: float, hold: str) -> tuple[float, float]:
-    x = -math.log1p(-mode.less)
+    x = -math.log1p(-mode.less) if mode.less < 0.5 else -math.log(mode.pole.real)
     return (mode.share / ramp_gain.python(x) if hold == "ramp" else mode.share), x / T
 
 
@@ -160,7 +162,7 @@ def _groups(poles: NDArray[Any], a: Array) -> list[list[int]]:
             continue
         members = one + two
         middle = np.mean(poles[members])
-        outside = np.abs(middle - np.delete(poles, members))
+        outside = np.abs(poles[members][:, None] - np.delete(poles, members)).max(axis=0)
         size = float(np.polyval(np.abs(a), abs(middle)) * max(float(abs(middle - 1.0)), _ROUNDING))
         if poles.size - 1 in members:  # the step's pole is exact; the others are as far from it as A's rounding
             size = float(np.sum(np.abs(a))) * distance
@@ -197,20 +199,24 @@ def _merged(
         turns = columns[:, moving] * shares[moving] * back[:, None] / (1.0 - centres[moving] * back[:, None])
         both = np.hstack([columns, turns]) / doubt[:, None]
         step = np.linalg.lstsq(both, error / doubt, rcond=None)[0][centres.size :]
-        width = np.array([np.abs(poles[g] - np.mean(poles[g])).max() for g, m in zip(groups, moving, strict=True) if m])
-        step = np.where(np.abs(step) <= width.astype(float), step, 0.0)
+        step = np.where(np.abs(step) < 0.1 * np.abs(1.0 - centres[moving]), step, 0.0)
         centres[moving] += np.where(np.array(real)[moving], step.real, step)
     if np.any(np.abs(error) > doubt):
-        crowd = max(groups, key=len)
-        where = complex(np.mean(poles[crowd]))
-        words = f"{where.real:.4g}" if abs(where.imag) < 1e-6 else f"{where.real:.4g} ± {abs(where.imag):.4g}j"
-        raise NotARelaxation((f"{len(crowd)} poles of its step response coincide at {words}: no sum of modes",))
+        raise NotARelaxation((_multiple(max(groups, key=len), poles),))
     return [_merged_mode(p, k, float(doubt.max())) for p, k in zip(centres, shares, strict=True)], at_one
 
 
 def _merged_mode(pole: complex, k: complex, doubt: float) -> _Mode:
     share = float(k.real) if pole.imag == 0.0 else float(abs(k))
     return _Mode(complex(pole), float(1.0 - pole.real), share, doubt)
+
+
+def _multiple(group: list[int], poles: NDArray[Any]) -> str:
+    if poles.size - 1 in group:
+        return "a pole lies at 1, beside that of the step: a held force would grow without end"
+    where = complex(np.mean(poles[group]))
+    words = f"{where.real:.4g}" if abs(where.imag) < 1e-6 else f"{where.real:.4g} ± {abs(where.imag):.4g}j"
+    return f"{len(group)} poles coincide at {words}: the response is no sum of exponentials"
 
 
 def _is_real(centre: complex, members: NDArray[Any]) -> bool:

@@ -13,7 +13,8 @@ A module-level function may call any of these by their global name. Left alone, 
 over ordinary sequences (`block.python`, `compiled.python`), which is how they are tested against themselves.
 
 **The cache.** numba keeps compiled code on disk, and looks only at the file a function stands in: an edit in a *called*
-function of another file goes unnoticed. So the folder is named after a hash of all of sim's sources; for a function that stands elsewhere, of those beside it too.
+function of another file goes unnoticed. So the folder is named after a hash of all of sim's sources; for a function
+that stands elsewhere, of the sources beside it too.
 """
 
 from __future__ import annotations

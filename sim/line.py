@@ -149,11 +149,11 @@ class Line:
 
     def available(self) -> int:
         """Bytes that have arrived at the host and were not read yet."""
+        if self.clock.wall:
+            self.clock.run_due()
         chunks = self._to_host
         if not chunks:
             return 0
-        if self.clock.wall:
-            self.clock.run_due()
         now_s = self.clock.now()
         count = 0
         for chunk in chunks:

@@ -236,6 +236,8 @@ def union(first: Array, second: Array) -> tuple[Array, NDArray[np.intp]]:
 
     Where stamps of the two fall within a nanosecond the one from `first` stands.
     """
+    if np.array_equal(first, second):
+        return first, np.arange(first.size)
     after = np.searchsorted(first, second)
     low, high = np.maximum(after - 1, 0), np.minimum(after, first.size - 1)
     near = np.where(np.abs(first[low] - second) <= np.abs(first[high] - second), low, high)

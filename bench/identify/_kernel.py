@@ -155,3 +155,32 @@ def modes(dt_s: Array, elastic: Array, rates: Array) -> Array:
             state[i] = _flushed(decay[i] * state[i] + gain[i] * rise)
             out[j, i + 1] = state[i]
     return out
+
+
+@compiled("float64(float64[::1], float64[::1], float64[::1])")
+def squared(weight: Array, measured: Array, force: Array) -> float:
+    """Σ w e². Here and below no BLAS: its threads cost more than they give on arrays of this size."""
+    total = 0.0
+    for j in range(measured.shape[0]):
+        error = measured[j] - force[j]
+        total += weight[j] * error * error
+    return total
+
+
+@compiled("float64(float64[::1], float64[::1], float64[::1], float64[:, ::1], float64[::1], float64[:, ::1])")
+def accumulate(weight: Array, measured: Array, force: Array, jacobian: Array, gradient: Array, matrix: Array) -> float:
+    """Add Σ w e J to `gradient` (P,) and the lower triangle of Σ w J Jᵀ to `matrix` (P, P); returns Σ w e²."""
+    n, P = jacobian.shape
+    total = 0.0
+    for j in range(n):
+        w = weight[j]
+        if w == 0.0:
+            continue
+        error = measured[j] - force[j]
+        total += w * error * error
+        for p in range(P):
+            scaled = w * jacobian[j, p]
+            gradient[p] += scaled * error
+            for q in range(p + 1):
+                matrix[p, q] += scaled * jacobian[j, q]
+    return total

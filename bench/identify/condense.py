@@ -9,7 +9,8 @@ from ._kernel import Array
 from .motion import holds
 from .problem import Problem, Run
 
-TARGET = 6000  # samples left, about
+TARGET = 6000  # samples left, at most about
+SHORT = 1500  # samples that need no stand-in
 
 
 def condensed(problem: Problem, target: int = TARGET) -> tuple[Problem, list[NDArray[np.intp]]]:
@@ -24,7 +25,7 @@ def condensed(problem: Problem, target: int = TARGET) -> tuple[Problem, list[NDA
         held = sum(s.stop - s.start for s in stretches)
         moving += run.size - held
         blocks_of_holds += sum(min(100, s.stop - s.start) for s in stretches)
-    if problem.size <= target:
+    if problem.size <= SHORT:
         return problem, [np.arange(run.size) for run in problem.runs]
     length = max(1, int(np.ceil(moving / max(target - blocks_of_holds, target // 3))))
     growth = 0.06 if blocks_of_holds < target else 0.06 * blocks_of_holds / target

@@ -33,7 +33,9 @@ def folds_of(problem: Problem) -> list[NDArray[np.intp]]:
     return out
 
 
-def held_out_square(short: Problem, full: Problem, owners: list[NDArray[np.intp]], estimate: Estimate) -> float:
+def held_out_square(
+    short: Problem, full: Problem, owners: list[NDArray[np.intp]], estimate: Estimate, max_steps: int = 25
+) -> float:
     """Mean squared error, in scaled force, of every sample as predicted by a fit that did not see its block.
 
     Refits are made on `short`, errors taken on `full`; `owners`: of each run, the short sample of every full one.
@@ -45,6 +47,6 @@ def held_out_square(short: Problem, full: Problem, owners: list[NDArray[np.intp]
         left = [np.where(f[o] == k, run.weight, 0.0) for f, o, run in zip(folds, owners, full.runs, strict=True)]
         if sum(float(w.sum()) for w in left) == 0 or sum(float(w.sum()) for w in kept) == 0:
             continue
-        refit = polish(short.weighted(kept), estimate, max_steps=25, tolerance=1e-6)
+        refit = polish(short.weighted(kept), estimate, max_steps, tolerance=1e-6)
         total += objective.cost(full.weighted(left), estimate.structure, refit.x)
     return total / full.weight

@@ -12,6 +12,7 @@ from bench.recording.types import Measurement
 from ._kernel import Array
 from .motion import holds, jitter
 
+HOLD = 3000  # samples of a hold that are looked at
 DEPTHS = 12  # bins of depth over which the stiffness is estimated
 
 
@@ -38,8 +39,9 @@ def noise_of(measurements: list[Measurement] | tuple[Measurement, ...]) -> Noise
     for m in measurements:
         for stretch in holds(m.position_time_s, m.position_mm):
             t0, t1 = m.position_time_s[stretch.start], m.position_time_s[stretch.stop - 1]
-            inside = (m.force_time_s >= t0) & (m.force_time_s <= t1)
-            error, free = _about_curve(m.force_time_s[inside] - t0, m.force_N[inside])
+            first, last = np.searchsorted(m.force_time_s, [t0, t1], side="left")
+            first = max(int(first), int(last) - HOLD)  # the end of a long one: relaxation has gone quiet there
+            error, free = _about_curve(m.force_time_s[first:last], m.force_N[first:last])
             if free > 0:
                 errors.append(error * np.sqrt(len(error) / free))
                 freedom += free

@@ -68,8 +68,7 @@ def cost(problem: Problem, structure: Structure, x: Array) -> float:
     total = 0.0
     for run in problem.runs:
         for piece in simulate(run, structure, x):
-            error = run.y[piece.at] - piece.force
-            total += float(np.dot(run.weight[piece.at] * error, error))
+            total += _kernel.squared(run.weight[piece.at], run.y[piece.at], piece.force)
     return total
 
 
@@ -79,13 +78,10 @@ def normal_equations(problem: Problem, structure: Structure, x: Array) -> tuple[
     total, gradient, matrix = 0.0, np.zeros(P), np.zeros((P, P))
     for run in problem.runs:
         for piece in simulate(run, structure, x, derivatives=True):
-            root = np.sqrt(run.weight[piece.at])
-            error = root * (run.y[piece.at] - piece.force)
-            weighted = piece.jacobian * root[:, None]
-            total += float(np.dot(error, error))
-            gradient += weighted.T @ error
-            matrix += weighted.T @ weighted
-    return total, gradient, matrix
+            total += _kernel.accumulate(
+                run.weight[piece.at], run.y[piece.at], piece.force, piece.jacobian, gradient, matrix
+            )
+    return total, gradient, matrix + np.tril(matrix, -1).T
 
 
 def forces(problem: Problem, structure: Structure, x: Array) -> list[tuple[Array, NDArray[np.bool_], Array]]:

@@ -110,16 +110,14 @@ def _finished(
     independent: float,
     contender: bool,
 ) -> Candidate:
-    """V and held-out error on all the data; a contender is polished there to the end, one far behind hardly."""
+    """V and held-out error on all the data; a contender is polished there, one far behind is taken as it is."""
     if contender:
         e = polish(problem, c.estimate)
-    elif problem.size <= LONG:
-        e = replace(polish(problem, c.estimate, max_steps=2), converged=c.estimate.converged)
-    else:
-        V = objective.cost(problem, c.estimate.structure, c.estimate.x) / problem.weight
-        return _judged(replace(c, V=V), independent)
-    held = held_out_square(short, problem, owners, e)
-    return _judged(Candidate(e, e.cost / problem.weight, held), independent)
+        held = held_out_square(short, problem, owners, e)
+        return _judged(Candidate(e, e.cost / problem.weight, held), independent)
+    V = objective.cost(problem, c.estimate.structure, c.estimate.x) / problem.weight
+    held = held_out_square(short, problem, owners, c.estimate, max_steps=5) if problem.size <= LONG else float("nan")
+    return _judged(Candidate(c.estimate, V, held), independent)
 
 
 class Ladder:

@@ -71,8 +71,8 @@ def _step(H: Array, g: Array, scale: Array, free: np.ndarray, damping: float) ->
     move = np.zeros(len(g))
     S = scale[free]
     A = H[np.ix_(free, free)] / np.outer(S, S)
-    A[np.diag_indices_from(A)] += damping
-    move[free] = np.linalg.lstsq(A, g[free] / S, rcond=1e-15)[0] / S
+    A[np.diag_indices_from(A)] += damping + 1e-14
+    move[free] = np.linalg.solve(A, g[free] / S) / S
     return move
 
 
@@ -81,4 +81,4 @@ def _promise(H: Array, g: Array, scale: Array, free: np.ndarray) -> float:
     b = g[free] / S
     A = H[np.ix_(free, free)] / np.outer(S, S)
     A[np.diag_indices_from(A)] += 1e-12
-    return float(b @ np.linalg.lstsq(A, b, rcond=1e-15)[0])
+    return float(b @ np.linalg.solve(A, b))

@@ -3,7 +3,8 @@
 The motor side moves by x, the probe by y = x − C F. With a linear pad of stiffness K the bench sees K/(1 + C K) instead
 of K. The force used is the one at the cell, solved within the step (sim/kernel.py), never the last step's.
 
-Reference: series compliance of a test frame, ASTM E111 section 5.2 and ISO 14577-1 annex D ("frame compliance").
+Reference: W. C. Oliver, G. M. Pharr, J. Mater. Res. 7, 1992, 1564–1583: the compliance measured is that of the
+contact plus that of the load frame.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Slopes at the knots are Fritsch and Butland's weighted harmonic means of the neighbouring secants, so the curve has no
 overshoot between points that rise (F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5, 1984, 300–304); the ends
-use the three-point formula limited to keep the shape (Moler, Numerical Computing with MATLAB, section 3.4).
+use the three-point formula limited to keep the shape (Moler, Numerical Computing with MATLAB, chapter 3).
 """
 
 from __future__ import annotations

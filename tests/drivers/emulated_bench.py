@@ -1,4 +1,4 @@
-"""A simulated bench on pseudo-terminals (or sockets), in a process of its own: `python -m tests.drivers.emulated_bench`.
+"""A simulated bench on pseudo-terminals or sockets, in a process: `python -m tests.drivers.emulated_bench JSON`.
 
 Takes the two devices as JSON (`{"motor": {…}, "load_cell": {…}}`, as in a bench file), prints `KEY PATH` a device.
 """

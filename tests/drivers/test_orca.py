@@ -6,7 +6,15 @@ import struct
 
 import pytest
 
-from drivers.errors import CrcError, DeviceFault, DriverError, ExceptionReply, ReadbackError, UnexpectedReply
+from drivers.errors import (
+    CrcError,
+    DeviceFault,
+    DeviceTimeout,
+    DriverError,
+    ExceptionReply,
+    ReadbackError,
+    UnexpectedReply,
+)
 from drivers.modbus import rtu_frame
 from drivers.motor import MotorLimits
 from drivers.orca import Orca, default_gap_s
@@ -70,12 +78,11 @@ def test_the_sample_time_takes_the_wire_off() -> None:
 )
 def test_bad_stream_replies(reply: bytes, error: type[DriverError]) -> None:
     request = command_frame(1, Command.POSITION, 0)
-    link = scripted_link([(request, reply)] * 3)
-    with pytest.raises(error):
-        call(Orca(link).stream(0.0), link)
     link = scripted_link([(request, reply), (request, REPLY)])
-    if error is not ExceptionReply:
-        assert call(Orca(link).stream(0.0), link).position_mm == pytest.approx(1.234)
+    motor = Orca(link)
+    with pytest.raises(error):
+        call(motor.stream(0.0), link)
+    assert call(motor.stream(0.0), link).position_mm == pytest.approx(1.234)
 
 
 def test_error_names() -> None:
@@ -335,9 +342,22 @@ def test_an_orca_takes_no_moves() -> None:
         Orca(scripted_link([])).move(1.0, 2.0, 3.0)
 
 
-def test_retries_of_a_set_point_are_the_same_set_point() -> None:
-    request = command_frame(1, Command.POSITION, 2500)
-    link = scripted_link([(request, None), (request, REPLY)])
-    call(Orca(link).stream(2.5), link)
-    assert port_of(link).sent == [request, request]
-    assert (link.traffic.timeouts, link.traffic.retries) == (1, 1)
+def test_a_streamed_set_point_is_not_sent_again_the_next_one_takes_its_place() -> None:
+    old, new = (command_frame(1, Command.POSITION, value) for value in (2500, 2600))
+    link = scripted_link([(old, None), (new, REPLY)])
+    motor = Orca(link)
+    with pytest.raises(DeviceTimeout):
+        call(motor.stream(2.5), link)
+    call(motor.stream(2.6), link)
+    assert port_of(link).finished
+    assert link.traffic.retries == 0
+
+
+def test_a_stop_is_sent_again_until_it_is_answered() -> None:
+    here = command_frame(1, Command.POSITION, 1234)
+    link = scripted_link([(here, REPLY), (here, None), (here, REPLY), (here, REPLY)])
+    motor = Orca(link)
+    call(motor.stream(1.234), link)
+    complete(motor.stop(), link)
+    assert port_of(link).finished
+    assert link.traffic.retries == 1

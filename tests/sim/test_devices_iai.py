@@ -6,7 +6,7 @@ import pytest
 
 from sim.devices.iai import Iai
 from sim.world import World
-from tests.sim.world_tools import IAI, SPRING, SPRING_N_mm, Client, bench
+from tests.sim.world_tools import IAI, SPRING, SPRING_N_mm, Client, bench, framed
 
 G_mm_s2 = 9806.65
 LONG_STROKE = IAI | {"stroke": (0.0, 100.0)}
@@ -92,7 +92,7 @@ def test_frames_of_the_manual(request_: str, reply: str) -> None:
 def test_reply_time_of_the_status_block() -> None:
     with bench(motor=IAI) as world:
         client = Client(world, "motor")
-        client.port.write(bytes.fromhex("01 03 90 00 00 0A E9 0D"))
+        client.port.write(framed("01 03 9000 000A"))
         client.clock.wait([client.port], 1.0)
         assert client.port.in_waiting == 25
         assert client.clock.now() == pytest.approx(330 / 38400 + 0.006, abs=1e-9)
@@ -102,7 +102,7 @@ def test_reply_time_of_the_status_block() -> None:
 def test_writing_a_table_row_takes_longer() -> None:
     with bench(motor=IAI) as world:
         client = Client(world, "motor")
-        client.port.write(bytes.fromhex("01 06 10 0A 00 1E 2C C0"))
+        client.port.write(framed("01 06 100A 001E"))
         client.clock.wait([client.port], 1.0)
         assert client.clock.now() == pytest.approx(160 / 38400 + 0.005 + 0.015, abs=1e-9)
 

@@ -1,6 +1,6 @@
 """How late does a 1 kHz loop get while it records? Inline, a writer thread, and a writer process, side by side.
 
-    python -m tests.bench.recording.bench_ticks [SECONDS]
+    python -m tests.bench.recording.bench_ticks [SECONDS]     (chrt -f 10 before it keeps other programs out)
 
 Each tick hands over one motor sample, and at 550 Hz a force sample; every second a step begins (flush and sync). The
 loop waits as the bench's does (`drivers.clock.WallClock`). Lateness is the time a tick begins after it was due;
@@ -96,7 +96,9 @@ def run(how: str, seconds: float, folder: Path) -> tuple[np.ndarray, np.ndarray]
 def main() -> None:
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
     print(f"{'':8}  {'lateness, µs':>33}  {'calls of a tick, µs':>33}")
-    print(f"{'':8}  {'median':>8}{'99 %':>8}{'99.9 %':>8}{'worst':>9}  {'median':>8}{'99 %':>8}{'99.9 %':>8}{'worst':>9}")
+    print(
+        f"{'':8}  {'median':>8}{'99 %':>8}{'99.9 %':>8}{'worst':>9}  {'median':>8}{'99 %':>8}{'99.9 %':>8}{'worst':>9}"
+    )
     for how in ("nothing", "inline", "thread", "process"):
         with tempfile.TemporaryDirectory() as folder:
             late, calls = run(how, seconds, Path(folder))

@@ -105,7 +105,9 @@ def test_same_calls_same_bytes_but_for_the_host_record(tmp_path):
     """Two runs of one seed differ in `padbench.host` alone: its length shifts nothing else."""
     one, two = tmp_path / "one.mcap", tmp_path / "two.mcap"
     write_run(one, host={"python": "3.11.7", "started": "2026-01-01T00:00:00"})
-    write_run(two, host={"python": "3.13", "started": "2026-02-03T10:11:12.123456", "machine": "another, with a long name"})
+    write_run(
+        two, host={"python": "3.13", "started": "2026-02-03T10:11:12.123456", "machine": "another, with a long name"}
+    )
     a, b = one.read_bytes(), two.read_bytes()
     assert len(a) == len(b)
     differing = [i for i in range(len(a)) if a[i] != b[i]]

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.reader import make_reader
-from mcap.stream_reader import breakup_chunk
-from mcap.records import Chunk, Message
 from mcap.data_stream import ReadDataStream
+from mcap.reader import make_reader
+from mcap.records import Chunk, Message
+from mcap.stream_reader import breakup_chunk
 
 from bench.errors import InputError
 from bench.recording import read_recording, recover

@@ -1,0 +1,130 @@
+"""What a fit leaves unexplained, in plain words: which simple pattern the residual follows.
+
+No diagnosis: each pattern is one small regression of the residual, told by the share of the excess over the noise
+that it takes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._kernel import Array
+from .motion import holds
+from .result import FitResult, Trace
+
+TELLING = 0.2  # a pattern that takes less of the excess is not worth a sentence
+MOST = 40_000
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """`share` of the residual's power beyond the noise that the pattern takes, 0 to 1; `sentence`: what it is."""
+
+    name: str
+    share: float
+    sentence: str
+
+
+def patterns(result: FitResult) -> list[Pattern]:
+    """All patterns, the strongest first; [] where the residual is within 1.2 times the noise floor."""
+    if result.rmse <= 1.2 * result.noise_floor:
+        return []
+    tables = [_features(t) for t in result.traces]
+    residual = np.concatenate([t[1] for t in tables])
+    excess = float(np.sum(residual**2)) - len(residual) * result.noise_floor**2
+    out = []
+    for name, sentence in SENTENCES.items():
+        columns = np.concatenate([t[0][name] for t in tables])
+        span = np.linalg.norm(columns, axis=0)
+        columns = columns[:, span > 0] / span[span > 0]
+        if columns.shape[1] == 0:
+            continue
+        solution = np.linalg.lstsq(columns, residual, rcond=1e-8)[0]
+        taken = float(np.sum((columns @ solution) ** 2))
+        out.append(Pattern(name, float(np.clip(taken / excess, 0.0, 1.0)), sentence))
+    return sorted(out, key=lambda p: -p.share)
+
+
+def sentence(result: FitResult) -> str:
+    """One or two plain sentences on what is left."""
+    ratio = result.rmse / result.noise_floor if result.noise_floor > 0 else np.inf
+    found = patterns(result)
+    if not found:
+        return f"Nothing plain: the error is {ratio:.2g} times the noise."
+    told = [p for p in found if p.share >= TELLING][:2]
+    start = f"The error is {ratio:.2g} times the noise. "
+    if not told:
+        return start + "It follows no simple pattern of motion, depth or time."
+    lines = [f"{100 * p.share:.0f} % of it {p.sentence}" for p in told]
+    return start + "; ".join(lines) + "."
+
+
+SENTENCES = {
+    "level": "is a constant offset of the force",
+    "drift": "drifts with time, in and out of contact alike",
+    "cycles": "grows or shrinks from one loading to the next (softening, conditioning or damage)",
+    "direction": "changes sign with the direction of motion (hysteresis that does not fade with slowness, or friction)",
+    "speed": "goes with the speed",
+    "acceleration": "goes with the acceleration (mass, or a late force)",
+    "depth": "is a fixed function of depth (the elastic law's shape)",
+    "late": "goes with the slope of the force (clocks of force and position apart, or a lag)",
+    "holds": "is a change through the holds that depends on the depth (relaxation not the same at every depth)",
+}
+
+
+def _features(t: Trace) -> tuple[dict[str, Array], Array]:
+    """Regressors of every pattern, (n, k) each, and the residual (n,), over the samples that count."""
+    counted = np.flatnonzero(t.counted)
+    stride = max(1, len(counted) // MOST)
+    time, depth, model = t.time_s[counted], t.position_mm[counted], t.simulated_N[counted]
+    still = np.zeros(len(time), dtype=bool)
+    since = np.zeros(len(time))
+    for s in holds(time, depth):
+        still[s] = True
+        since[s] = time[s] - time[s.start]
+    speed = np.where(still, 0.0, _slope(time, depth))
+    acceleration = np.where(still, 0.0, _slope(time, speed))
+    u = depth / max(float(np.abs(depth).max()), 1e-300)
+    way = np.sign(speed) * (np.abs(speed) > 0.02 * np.abs(speed).max(initial=0.0))
+    inside = (u > 0).astype(float)
+    progress = (time - time[0]) / max(time[-1] - time[0], 1e-300) - 0.5
+    edges = np.linspace(0, 1, 9)
+    hats = np.stack([np.maximum(0, 1 - np.abs(u - e) * 8) for e in edges[1:]], axis=1)
+    relaxing = np.log1p(since / max(float(np.median(np.diff(time))), 1e-300))
+    columns = {
+        "level": np.ones((len(time), 1)),
+        "drift": np.stack([np.ones(len(time)), progress, progress**2], axis=1),
+        "cycles": np.stack([model, model * progress, model * _loading(u)], axis=1),
+        "direction": np.stack([way, way * u, way * inside], axis=1),
+        "speed": np.stack([speed, speed * inside], axis=1),
+        "acceleration": acceleration[:, None],
+        "depth": hats,
+        "late": _slope(time, model)[:, None],
+        "holds": np.stack([still * relaxing * h for h in hats.T], axis=1),
+    }
+    error = t.residual_N[counted]
+    return {k: v[::stride] for k, v in columns.items()}, error[::stride]
+
+
+def _slope(time: Array, y: Array) -> Array:
+    """Derivative over a few samples on either side."""
+    reach = 3 if len(time) > 60 else 1
+    if len(time) < 2 * reach + 1:
+        return np.zeros(len(time))
+    out = np.zeros(len(time))
+    out[reach:-reach] = (y[2 * reach :] - y[: -2 * reach]) / (time[2 * reach :] - time[: -2 * reach])
+    return out
+
+
+def _loading(u: Array) -> Array:
+    """Log of the number of the loading a sample belongs to (from below a third of the depth to above two)."""
+    number, out, armed = 1, np.empty(len(u)), True
+    for k, value in enumerate(u.tolist()):
+        if armed and value > 2 / 3:
+            armed = False
+        elif not armed and value < 1 / 3:
+            armed, number = True, number + 1
+        out[k] = number
+    return np.asarray(np.log(out))

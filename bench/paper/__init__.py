@@ -1,0 +1,1 @@
+"""The paper: its tables as data, and its figures remade."""
