@@ -5,6 +5,7 @@ from __future__ import annotations
 import select
 import time
 from collections.abc import Sequence
+from typing import Any, cast
 
 from drivers.wire import Port
 
@@ -26,14 +27,13 @@ class WallClock:
         """Seconds since the clock was made."""
         return time.perf_counter() - self._start_s
 
-    def wait(self, ports: Sequence[Port], until_s: float) -> None:
+    def wait(self, ports: Sequence[Port], until_s: float) -> Sequence[Port]:
         """Return when a port has bytes to read, at the latest at `until_s` (see `drivers.wire.Clock`)."""
-        descriptors = [port.fileno() for port in ports if hasattr(port, "fileno")]
         while True:
             left = until_s - self.now()
             if left <= 0:
-                return
+                return ()
             timeout = 0.0 if left < SPIN_S else min(left - SPIN_S / 2, 1.0)
-            ready, _, _ = select.select(descriptors, [], [], timeout)
+            ready: Sequence[Any] = select.select(cast(Any, ports), [], [], timeout)[0]
             if ready:
-                return
+                return ready

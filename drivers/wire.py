@@ -48,8 +48,8 @@ class Clock(Protocol):
         """Seconds since the clock was made; never goes back."""
         ...
 
-    def wait(self, ports: Sequence[Port], until_s: float) -> None:
-        """Return as soon as one of the ports has bytes to read, at the latest at `until_s`."""
+    def wait(self, ports: Sequence[Port], until_s: float) -> Sequence[Port]:
+        """Return as soon as one of the ports has bytes to read, at the latest at `until_s`; returns those that have."""
         ...
 
 

@@ -19,7 +19,7 @@ from typing import Any
 VIRTUAL_EPOCH_NS = 1_767_225_600_000_000_000
 """Virtual time starts at 2026-01-01T00:00:00Z always: one seed, the same bytes."""
 
-WAKE_MARGIN_S = 1.5e-4
+WAKE_MARGIN_S = 6e-5
 """A sleeping process wakes up to about this late; the last stretch before an event is spun."""
 
 
@@ -46,19 +46,17 @@ class SimClock:
 
     `wall=False`: virtual; `wait` moves the time. `wall=True`: real time passes, the same events run when they are
     due, and ports with a descriptor (pseudo-terminals, sockets) are waited on as well.
-    `busy_until_s`: on the wall clock, `wait` polls its descriptors without sleeping until then; for answers that
-    must not be late by a process wake-up.
     """
 
     def __init__(self, wall: bool = False) -> None:
         self.wall = wall
         self.epoch_ns = time.time_ns() if wall else VIRTUAL_EPOCH_NS
-        self.busy_until_s = 0.0
         self._start_s = time.perf_counter()
         self._now_s = 0.0
         self._events: list[tuple[float, int, Event]] = []
         self._count = 0
         self._arrival = False
+        self._unread = 0
         if wall:
             _fine_timers()
 
@@ -81,27 +79,32 @@ class SimClock:
         return events[0][0] if events else float("inf")
 
     def arrived(self) -> None:
-        """Tell a waiting caller that a port has received something (called by the lines)."""
+        """A line has delivered a frame to its host: a waiting caller is to look."""
         self._arrival = True
+        self._unread += 1
+
+    def taken(self) -> None:
+        """A host has read such a frame to its end."""
+        self._unread -= 1
 
     def run_due(self) -> None:
         """Run the events that are due by now; the wall clock's ports do so before they are read."""
         self._run_until(self.now())
 
-    def wait(self, ports: Sequence[Any], until_s: float) -> None:
-        """Return as soon as one of the ports has bytes to read, at the latest at `until_s`.
+    def wait(self, ports: Sequence[Any], until_s: float) -> Sequence[Any]:
+        """Return as soon as one of the ports has bytes to read, at the latest at `until_s`; returns those that have.
 
-        `ports` are pyserial ports (`in_waiting`; on the wall clock those with a `fileno` are selected on).
+        `ports` are pyserial ports (`frame_waiting`, `in_waiting`; on the wall clock those with a `fileno` are selected on).
         A frame wakes a waiting caller when its last byte has arrived, and not at each byte.
 
         Raises `Deadlock` on a virtual clock where `until_s` is infinite and nothing is scheduled.
         """
         if self.wall:
-            self._wait_wall(ports, until_s)
-            return
-        for port in ports:
-            if port.in_waiting:
-                return
+            return self._wait_wall(ports, until_s)
+        if self._unread:
+            ready = [port for port in ports if port.frame_waiting]
+            if ready:
+                return ready
         events = self._events
         self._arrival = False
         while events and events[0][0] <= until_s:
@@ -114,13 +117,14 @@ class SimClock:
             callback(at_s)
             if self._arrival:
                 self._arrival = False
-                for port in ports:
-                    if port.in_waiting:
-                        return
+                ready = [port for port in ports if port.frame_waiting]
+                if ready:
+                    return ready
         if until_s == float("inf"):
             raise Deadlock("waiting for bytes that nothing on this simulated bench is going to send")
         if until_s > self._now_s:
             self._now_s = until_s
+        return ()
 
     def _run_until(self, until_s: float) -> None:
         events = self._events
@@ -129,24 +133,25 @@ class SimClock:
             if event.callback is not None:
                 event.callback(at_s)
 
-    def _wait_wall(self, ports: Sequence[Any], until_s: float) -> None:
+    def _wait_wall(self, ports: Sequence[Any], until_s: float) -> Sequence[Any]:
         simulated = [port for port in ports if hasattr(port, "line")]
-        descriptors = [port.fileno() for port in ports if not hasattr(port, "line")]
+        descriptors = [port for port in ports if not hasattr(port, "line")]  # select takes what has a fileno
         while True:
             self.run_due()
-            for port in simulated:
-                if port.in_waiting:
-                    return
+            ready = [port for port in simulated if port.in_waiting]
+            if ready:
+                return ready
             now_s = self.now()
             wake_s = min(until_s, self.next_event_s())
-            margin_s = 0.0 if now_s < self.busy_until_s else wake_s - now_s - WAKE_MARGIN_S
+            margin_s = wake_s - now_s - WAKE_MARGIN_S
             if descriptors:
-                if select.select(descriptors, [], [], max(0.0, min(margin_s, 1.0)))[0]:
-                    return
+                ready = select.select(descriptors, [], [], max(0.0, min(margin_s, 1.0)))[0]
+                if ready:
+                    return ready
             elif margin_s > 0.0:
                 time.sleep(min(margin_s, 1.0))
             if now_s >= until_s:
-                return
+                return ()
 
 
 def _fine_timers() -> None:

@@ -24,6 +24,9 @@ from sim.kernel import ramp_gain
 TOLERANCE = 1e-9
 """Share of a step's force below which a difference counts as none."""
 
+OPEN = 1e-2
+"""Where the digits of the coefficients leave more than this of the shares open, nothing is said of them."""
+
 _ROUNDING = 16 * float(np.finfo(np.float64).eps)
 
 
@@ -62,7 +65,10 @@ def relaxation_of(
         raise ValueError(f"the sample time must be a finite number of seconds above 0, not {T:g}")
     if hold not in ("zero_order", "ramp"):
         raise ValueError(f"no hold {hold!r}; there are 'zero_order' and 'ramp'")
-    c_0, modes = _step_response(filter, tolerance)
+    c_0, modes, doubt = _step_response(filter, tolerance)
+    if doubt > max(OPEN, tolerance):
+        words = f"the digits of its coefficients leave its shares open by {doubt:.2g}"
+        raise NotARelaxation((f"{words}: the poles crowd together, and a longer sample time would set them apart",))
     reasons = [reason for mode in modes if (reason := _fault(mode, tolerance))]
     if c_0.share < -tolerance - c_0.doubt:
         reasons.append(f"a held force would end below 0 (static gain {c_0.share:.4g})")
@@ -73,7 +79,7 @@ def relaxation_of(
     found = sorted((_mode(mode, T, hold) for mode in modes), key=lambda pair: -pair[1])
     shares, rates = tuple(share for share, _ in found), tuple(rate for _, rate in found)
     start = math.fsum((c_0.share, *shares))
-    if abs(start - 1.0) > tolerance + c_0.doubt + math.fsum(mode.doubt for mode in modes):
+    if abs(start - 1.0) > tolerance + doubt:
         raise NotARelaxation(
             (f"its response to a step starts at {start:.6g}, not at 1: divide b by that, and multiply F^e by it",)
         )
@@ -116,8 +122,8 @@ def _fault(mode: _Mode, tolerance: float) -> str:
     return ""
 
 
-def _step_response(filter: Filter, tolerance: float) -> tuple[_Mode, list[_Mode]]:
-    """The term at z = 1 and the others that are there; raises NotARelaxation where there is no such sum."""
+def _step_response(filter: Filter, tolerance: float) -> tuple[_Mode, list[_Mode], float]:
+    """The term at z = 1, the others that are there, and all that rounding leaves open of them; raises NotARelaxation where there is no such sum."""
     a, b = np.trim_zeros(np.array(filter.a), "b"), np.trim_zeros(np.array(filter.b), "b")
     if b.size > a.size:
         extra = f"l = {b.size - 1} is more than r = {a.size - 1}"
@@ -131,7 +137,7 @@ def _step_response(filter: Filter, tolerance: float) -> tuple[_Mode, list[_Mode]
     else:
         modes, last = _merged(poles, groups, a, b, tolerance)
     kept = [m for i, m in enumerate(modes) if i != last and abs(m.share) > tolerance + m.doubt]
-    return modes[last], kept
+    return modes[last], kept, math.fsum(mode.doubt for mode in modes)
 
 
 def _residue(poles: NDArray[Any], i: int, a: Array, b: Array) -> _Mode:
@@ -213,7 +219,7 @@ def _merged_mode(pole: complex, k: complex, doubt: float) -> _Mode:
 
 def _multiple(group: list[int], poles: NDArray[Any]) -> str:
     if poles.size - 1 in group:
-        return "a pole lies at 1, beside that of the step: a held force would grow without end"
+        return "a pole lies at 1, or too near to tell: a held force would grow without end"
     where = complex(np.mean(poles[group]))
     words = f"{where.real:.4g}" if abs(where.imag) < 1e-6 else f"{where.real:.4g} ± {abs(where.imag):.4g}j"
     return f"{len(group)} poles coincide at {words}: the response is no sum of exponentials"

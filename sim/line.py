@@ -142,10 +142,9 @@ class Line:
         return end_s
 
     def _delivered(self, at_s: float) -> None:
+        self.clock.arrived()
         if self.sink is not None:
             self.sink(self._take(1 << 30, at_s))
-        else:
-            self.clock.arrived()
 
     def available(self) -> int:
         """Bytes that have arrived at the host and were not read yet."""
@@ -162,6 +161,11 @@ class Line:
             if here < len(chunk.data):
                 break
         return count
+
+    def frame_arrived(self) -> bool:
+        """Whether something the device sent in one piece has arrived to its last byte."""
+        chunks = self._to_host
+        return bool(chunks) and chunks[0].end_s <= self.clock.now()
 
     def host_read(self, size: int) -> bytes:
         """At most `size` of the bytes that have arrived."""
@@ -183,6 +187,7 @@ class Line:
             if until < len(chunk.data):
                 break
             chunks.popleft()
+            self.clock.taken()
         return parts[0] if len(parts) == 1 else b"".join(parts)
 
     def drop_received(self) -> None:

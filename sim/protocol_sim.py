@@ -64,6 +64,11 @@ class Serial(SerialBase):
         return self._connected().available()
 
     @property
+    def frame_waiting(self) -> bool:
+        """Whether a whole frame waits to be read: what a waiting reader is woken for."""
+        return self._connected().frame_arrived()
+
+    @property
     def out_waiting(self) -> int:
         """Bytes written that have not left yet."""
         return self._connected().to_device_waiting()

@@ -50,6 +50,7 @@ def main(args: argparse.Namespace) -> int:
 def _list() -> int:
     from bench.shipped import shipped_names
 
-    for kind, title in (("protocol", "protocols"), ("bench", "benches"), ("pad", "pads")):
-        print(f"{title}: {', '.join(shipped_names(kind))}")
+    print(f"protocols: {', '.join(shipped_names('protocol'))}")
+    print(f"benches: {', '.join(shipped_names('bench'))}")
+    print(f"pads: {', '.join(shipped_names('pad'))}")
     return EXIT_DONE

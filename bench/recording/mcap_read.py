@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import mmap
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -42,13 +43,15 @@ def mapped(path: Path) -> Iterator[Buffer]:
     """The bytes of a file without loading it whole; raises `InputError` where it cannot be read."""
     try:
         with path.open("rb") as file:
-            if file.seek(0, 2) == 0:
-                yield b""
-                return
-            with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                yield data
+            empty = file.seek(0, os.SEEK_END) == 0
+            data = None if empty else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
         raise InputError(str(path), f"cannot be read ({error.strerror})") from None
+    if data is None:
+        yield b""
+        return
+    with data:
+        yield data
 
 
 def read_mcap(path: Path) -> Recording:

@@ -180,15 +180,14 @@ def _report_spikes(what: str, time_s: Array, values: Array, notes: list[str]) ->
     """Single samples that leave and come back at once; they are reported, whoever fits decides about them."""
     if values.size < 8:
         return
-    off = values[1:-1] - 0.5 * (values[:-2] + values[2:])
+    up, down = values[1:-1] - values[:-2], values[1:-1] - values[2:]
+    away = np.where(up * down > 0, np.minimum(np.abs(up), np.abs(down)), 0.0)
+    bend = np.abs(up + down) / 2
+    noise = 1.4826 * float(np.median(bend[bend > 0])) if np.any(bend) else 0.0  # a channel may stand still
     steps = np.abs(np.diff(values))
     before = np.concatenate([steps[:1], steps[:-2]])
     after = np.concatenate([steps[2:], steps[-1:]])
-    noise = 1.4826 * float(np.median(np.abs(off)))
-    if noise == 0.0 and np.any(off):  # a channel that mostly stands still
-        noise = 1.4826 * float(np.median(np.abs(off[off != 0])))
-    moved = np.maximum(before, after)
-    spikes = np.flatnonzero((np.abs(off) > SPIKE * noise) & (np.abs(off) > SPIKE_OVER_STEPS * moved))
+    spikes = np.flatnonzero((away > SPIKE * noise) & (away > SPIKE_OVER_STEPS * np.maximum(before, after)))
     if spikes.size:
         notes.append(f"{what}: {spikes.size} isolated drop-outs, the first at {time_s[spikes[0] + 1]:.6g} s")
 

@@ -7,7 +7,7 @@ recorded and judged as they arrive, whatever the script is doing; the loop waits
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
@@ -19,10 +19,13 @@ from bench.run.safety import Monitor
 from drivers.errors import DriverError
 from drivers.loadcell import ForceSample
 from drivers.motor import MotorSample
-from drivers.wire import Pause, Steps
+from drivers.wire import Pause, Port, Steps
 
 T = TypeVar("T")
 Script = Generator[None, None, T]
+
+LONGEST_WAIT_S = 0.02
+"""The loop turns at least so often, to look at the operator's stop and at how old the samples are."""
 
 MAX_FAILED_POLLS = 3
 """So many exchanges with the motor may fail in a row before the run stops; the stale limit usually comes first."""
@@ -107,12 +110,13 @@ class Loop:
 
         Raises `Stopped` with the first cause when a limit is crossed, a device fails or the operator stops.
         """
-        rig, axis, clock = self.rig, self.axis, self.clock
-        ports = rig.ports
+        rig, axis, clock, links, ports = self.rig, self.axis, self.clock, self.rig.links, self.rig.ports
+        ready: Sequence[Port] = ports
         while True:
-            for link in rig.links:
-                link.service()
             now = clock.now()
+            for link in links:
+                if link.port in ready or link.wake_at() <= now:
+                    link.service()
             self._take(now)
             self.monitor.check()
             try:
@@ -125,14 +129,12 @@ class Loop:
             self.sink.tick(now)
             if self.on_turn is not None:
                 self.on_turn(now)
-            wake = min(axis.wake_at(), now + 0.05)
-            for link in rig.links:
-                wake = min(wake, link.wake_at())
+            wake = min(axis.wake_at(), now + LONGEST_WAIT_S, *[link.wake_at() for link in links])
             if self.measuring:
                 due = rig.load_cell.next_poll_s()
-                if due is not None:
-                    wake = min(wake, due)
-            clock.wait(ports, wake)
+                if due is not None and due < wake:
+                    wake = due
+            ready = clock.wait(ports, wake)
 
     def begin_measuring(self) -> None:
         """The load cell is running: from now on its silence counts."""

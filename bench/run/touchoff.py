@@ -146,4 +146,4 @@ def _cost(x: Array, force: Array, x0: float, exponent: float) -> tuple[float, Ar
     basis = np.column_stack([np.ones_like(x), r**exponent, r ** (exponent + 1.0)])
     coefficients, *_ = np.linalg.lstsq(basis, force, rcond=None)
     rest = force - basis @ coefficients
-    return float(rest @ rest), coefficients
+    return float(rest @ rest), np.asarray(coefficients, dtype=np.float64)

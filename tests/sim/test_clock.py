@@ -11,7 +11,7 @@ class FakePort:
     """A port as the clock sees it."""
 
     def __init__(self) -> None:
-        self.in_waiting = 0
+        self.frame_waiting = 0
         self.line = None
 
 
@@ -55,7 +55,7 @@ def test_waiting_ends_when_a_port_has_bytes() -> None:
     port = FakePort()
 
     def deliver(due_s: float) -> None:
-        port.in_waiting = 3
+        port.frame_waiting = 3
         clock.arrived()
 
     clock.schedule(0.25, deliver)

@@ -242,3 +242,21 @@ def test_filter_properties() -> None:
 def test_what_makes_no_sense_is_refused(call, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         call()
+
+
+def test_where_digits_do_not_tell_nothing_is_claimed() -> None:
+    """Four modes at 1 kHz, the slowest pole 3e-5 from 1: what is found is near the truth, or said to be open."""
+    rng = np.random.default_rng(5)
+    t = np.geomspace(1e-3, 100, 40)
+    refused = 0
+    for _ in range(200):
+        rates = np.sort(10 ** rng.uniform(-2, 2, 4))[::-1]
+        shares = rng.dirichlet(np.ones(5))[1:]
+        try:
+            found = relaxation_of(ramp_invariant(shares, rates, 1e-3), 1e-3, "ramp")
+        except NotARelaxation as error:
+            refused += 1
+            assert "digits" in error.reason or "too near to tell" in error.reason
+            continue
+        assert_allclose(Relaxation(*found).reduced(t), Relaxation(tuple(shares), tuple(rates)).reduced(t), atol=1e-2)
+    assert 0 < refused < 200

@@ -198,6 +198,8 @@ def test_recover_says_what_it_cannot_do(tmp_path):
         recover(run, run)
     with pytest.raises(InputError, match="does not exist"):
         recover(tmp_path / "none.mcap")
+    with pytest.raises(InputError, match=r"out\.mcap: cannot be written"):
+        recover(run, tmp_path / "nowhere" / "out.mcap")
 
 
 def test_a_file_without_its_first_bytes_can_be_recovered(whole, tmp_path):

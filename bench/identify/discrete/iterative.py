@@ -1,0 +1,121 @@
+"""The paper's iterative method, and the same with an instrumental-variable step (`iv`).
+
+In turn, until the numbers stand still: γ by (16) with A and B held; then A and B by linear least squares with
+u = F^e(δ; γ), as an ARX system with b_0 = 1 held: F(k) − u(k) is regressed on F(k−i) and u(k−i), so the gain stays with
+γ and no rescaling is needed. It starts from A = B = 1 (a_i = b_i = 0), as the paper does for its fast form.
+
+The turns are a fixed-point iteration on two different criteria; V need not fall, and the fixed point is no minimum of V.
+With `iv` in place of ARX it is one (see `linear`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from bench.errors import InputError
+from bench.recording.types import Measurement
+
+from .._kernel import Array
+from ..noise import noise_of
+from ..result import FitResult
+from . import outcome
+from .estimator import Found, arx_scores, output_error_scores, relative_V, silent
+from .linear import arx, iv
+from .search import first_gamma, gamma_step
+from .series import Data
+from .system import Structure, simulate
+
+TURNS = 200
+STILL = 1e-7
+"""Converged: the simulated force moved by less than this share of its own size in a turn."""
+
+
+def fit(
+    measurements: Sequence[Measurement],
+    law: str = "auto",
+    order: int | str = "auto",
+    contact: str = "auto",
+    degree: int | None = None,
+    progress: Callable[[str], None] | None = None,
+    sample_time: float | None = None,
+) -> FitResult:
+    """Fit one pad by turns of (16) and ARX. `sample_time` T in s (default: from the data)."""
+    return outcome.fit(Iterative(), measurements, law, order, contact, degree, progress, sample_time)
+
+
+class Iterative:
+    """The scheme, for `outcome.fit`."""
+
+    name = "iterative"
+    instrumental = False
+
+    def estimate(self, data: Data, structure: Structure, quick: bool = False, start: Array | None = None) -> Found:
+        """The fixed point of the turns; where the filter of a turn runs away, the best turn before it."""
+        none = np.zeros(structure.order)
+        v = start if start is not None else first_gamma(data, structure, none, none)
+        if v is None:
+            raise InputError("fit", "the elastic response alone cannot be fitted to these data")
+        left = None
+        if start is None:
+            noise = noise_of(data.on_grid()).force_N / data.force_N
+            left = silent(data, structure, noise)
+        before, history, converged = _force(data, structure, v), [], False
+        for turn in range(TURNS // 4 if quick else TURNS):
+            linear = self._linear(data, structure, v, left, first=turn == 0 and start is None)
+            next_v = gamma_step(data, structure, structure.joined(v[: structure.nonlinear], linear))
+            if next_v is None:
+                break
+            v, left = next_v, None
+            history.append((relative_V(data, structure, v), v))
+            now = _force(data, structure, v)
+            moved = float(np.linalg.norm(now - before)) / max(float(np.linalg.norm(now)), 1e-300)
+            before = now
+            if moved < STILL:
+                converged = True
+                break
+        if not history:
+            raise InputError("fit", f"the ARX filter of order {structure.order} grows without end within these data",
+                             "Try another order, or a longer --sample-time.")  # fmt: skip
+        notes = []
+        if not converged:
+            V, v = min(history, key=lambda item: item[0])
+            notes.append(f"The turns did not converge in {len(history)}; this is the one with the least V.")
+        return Found(relative_V(data, structure, v), v, len(history), converged, history, notes=notes)
+
+    def scores(self, data: Data, structure: Structure, v: Array) -> list[Array]:
+        """Those of the two steps."""
+        return arx_scores(data, structure, v)
+
+    def _linear(self, data: Data, structure: Structure, v: Array, left: list[np.ndarray] | None, first: bool) -> Array:
+        return arx(data, structure, v, left)
+
+
+class Instrumental(Iterative):
+    """The turns with the refined instrumental variable; the first is ARX, which gives it a filter to begin with."""
+
+    name = "iv"
+
+    def scores(self, data: Data, structure: Structure, v: Array) -> list[Array]:
+        """Those of the output error, whose stationary point it is."""
+        return output_error_scores(data, structure, v)
+
+    def _linear(self, data: Data, structure: Structure, v: Array, left: list[np.ndarray] | None, first: bool) -> Array:
+        return arx(data, structure, v, left) if first else refined(data, structure, v)
+
+
+def refined(data: Data, structure: Structure, v: Array) -> Array:
+    """An instrumental-variable step, shortened while it would make the filter run away or V much worse."""
+    g = structure.nonlinear
+    old, new = v[g:], iv(data, structure, v)
+    V = relative_V(data, structure, v)
+    for share in (1.0, 0.5, 0.25, 0.1, 0.02):
+        tried = old + share * (new - old)
+        if relative_V(data, structure, structure.joined(v[:g], tried)) <= 2 * V:
+            return tried
+    return old
+
+
+def _force(data: Data, structure: Structure, v: Array) -> Array:
+    return np.concatenate([simulate(run, structure, v).force for run in data.runs])

@@ -1,0 +1,114 @@
+"""The linear step: A and B by least squares, γ given. ARX as in the paper, or by instrumental variables.
+
+With u = F^e(δ; γ) and b_0 = 1 fixed (the gain is γ's, so the normalisation of (13) costs no rescaling),
+
+    F(k) − u(k) = −Σ a_i F(k−i) + Σ b_i u(k−i) + error.
+
+ARX takes this error as white. On a bench the noise sits on the measured force instead, so that it is in the
+regressors too, and the estimate stays wrong however long the data are. The refined instrumental variable (Young; the
+fixed point of Steiglitz and McBride) filters F and u by 1/A and correlates with the simulated, noise-free output in
+place of the measured one; where it stands still the simulated output error is orthogonal to its own sensitivities:
+it is the output-error estimate, consistent under any noise that does not depend on the motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._kernel import Array
+from .series import Data, Series
+from .system import Simulated, Structure, simulate
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Of one run: target (K,), regressors (K, 2r), instruments (K, 2r), and which rows count."""
+
+    target: Array
+    regressors: Array
+    instruments: Array
+    rows: NDArray[np.bool_]
+
+
+def arx(data: Data, structure: Structure, v: Array, left: list[NDArray[np.bool_]] | None = None) -> Array:
+    """(α, β) by ordinary least squares, u from the γ in v. `left`: rows to leave out (the pad has let go there)."""
+    systems = [arx_equations(run, structure, v, None if left is None else left[j]) for j, run in enumerate(data.runs)]
+    target = np.concatenate([e.target[e.rows] for e in systems])
+    regressors = np.concatenate([e.regressors[e.rows] for e in systems])
+    return _scaled_lstsq(regressors, target)
+
+
+def arx_equations(
+    run: Series, structure: Structure, v: Array, left: NDArray[np.bool_] | None = None, now: Simulated | None = None
+) -> Equations:
+    """The ARX equations of a run. Where a unilateral pad has let go u is the free surface's, as simulated with v."""
+    out = now if now is not None else simulate(run, structure, v)
+    u = out.elastic
+    gone = out.let_go if left is None else left
+    target = _power(run.y, structure.order, 0) - _power(u, structure.order, 0)
+    regressors = np.concatenate([-_basis(run.y, structure.order), _basis(u, structure.order)], axis=1)
+    rows = _rows(run, structure.order) & ~gone
+    return Equations(target, regressors, regressors, rows)
+
+
+def iv(data: Data, structure: Structure, v: Array) -> Array:
+    """(α, β) by one step of the refined instrumental variable from the filter in v; v itself where that is no help."""
+    r2 = 2 * structure.order
+    matrix, right = np.zeros((r2, r2)), np.zeros(r2)
+    for run in data.runs:
+        e = iv_equations(run, structure, v)
+        if e is None:
+            return v[structure.nonlinear :].copy()
+        Z = e.instruments[e.rows]
+        matrix += Z.T @ e.regressors[e.rows]
+        right += Z.T @ e.target[e.rows]
+    scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), 1e-300))
+    return np.asarray(np.linalg.lstsq(matrix / np.outer(scale, scale), right / scale, rcond=1e-14)[0] / scale)
+
+
+def iv_equations(run: Series, structure: Structure, v: Array) -> Equations | None:
+    """The instrumental equations of a run; None where 1/A is unstable."""
+    from scipy.signal import lfilter
+
+    filter = structure.filter(v)
+    if not filter.stable:
+        return None
+    out = simulate(run, structure, v)
+    if not out.ok:
+        return None
+    y = np.where(run.has, run.y, out.force)  # a gap is filled by the simulation: it carries no error
+    y, u, x = (np.asarray(lfilter([1.0], filter.a, signal)) for signal in (y, out.elastic, out.force))
+    r = structure.order
+    target = _power(y, r, 0) - _power(u, r, 0)
+    regressors = np.concatenate([-_basis(y, r), _basis(u, r)], axis=1)
+    instruments = np.concatenate([-_basis(x, r), _basis(u, r)], axis=1)
+    return Equations(target, regressors, instruments, (run.weight > 0) & ~out.let_go)
+
+
+def _rows(run: Series, order: int) -> NDArray[np.bool_]:
+    """Samples that count and whose past is measured."""
+    rows = run.weight > 0
+    for i in range(1, order + 1):
+        rows[i:] &= run.has[:-i]
+    return rows
+
+
+def _power(x: Array, order: int, delay: int) -> Array:
+    """(1 − z⁻¹)^order z^−delay x, from rest."""
+    for _ in range(order):
+        x = np.diff(x, prepend=0.0)
+    return np.concatenate([np.zeros(delay), x[: len(x) - delay]]) if delay else x
+
+
+def _basis(x: Array, r: int) -> Array:
+    """Columns (1 − z⁻¹)^j z^(j−r) x, j = 0 … r−1: (K, r)."""
+    return np.stack([_power(x, j, r - j) for j in range(r)], axis=1) if r else np.zeros((len(x), 0))
+
+
+def _scaled_lstsq(A: Array, b: Array) -> Array:
+    scale = np.linalg.norm(A, axis=0)
+    scale[scale == 0] = 1.0
+    return np.asarray(np.linalg.lstsq(A / scale, b, rcond=1e-13)[0] / scale)

@@ -1,0 +1,152 @@
+"""Measurements on a uniform grid of T seconds, as a digital filter needs them.
+
+A grid sample is the mean of all force samples within its T seconds: that takes out what is quicker than the grid can
+hold (no alias), leaves white noise white, and cannot ring. The elastic response goes through the same mean:
+F^e(δ) is taken at the force samples and averaged then, never F^e of a mean depth. A mean over time commutes with the
+linear filter behind it, so what is averaged still obeys the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.errors import InputError
+from bench.recording.types import Measurement
+
+from .. import problem
+from .._kernel import Array
+from ..laws import Family
+
+FEWEST = 20  # grid samples that can be fitted
+
+
+@dataclass(frozen=True)
+class Series:
+    """One run on the grid. `time_s` (K,): middles of the cells; `y` (K,): mean force over the force scale, 0 where a
+    cell has none; `has` (K,): whether it has; `weight` (K,): 1 where it counts, else 0 (history, or no force).
+
+    `u` (n,): depth over D at the nodes, which are the force samples and the middles of empty cells; `owner` (n,): the
+    cell of each; `count` (K,): nodes in each; `depth_mm` (K,): their mean depth.
+    """
+
+    time_s: Array
+    y: Array
+    has: NDArray[np.bool_]
+    weight: Array
+    u: Array
+    owner: NDArray[np.intp]
+    count: Array
+    depth_mm: Array
+
+    def elastic(self, family: Family, theta: Array) -> tuple[Array, Array]:
+        """Elastic response over its value at D, averaged: s (K,), ds/dθ (K, k)."""
+        s, ds = family.shape(self.u, theta)
+        if len(s) == len(self.count):
+            return s, np.ascontiguousarray(ds)
+        columns = [np.bincount(self.owner, column) / self.count for column in ds.T]
+        mean = np.bincount(self.owner, s) / self.count
+        return mean, np.ascontiguousarray(np.stack(columns, axis=1)) if columns else np.zeros((len(mean), 0))
+
+
+@dataclass(frozen=True)
+class Data:
+    """Runs of one pad on a grid of `T` seconds; D = `depth_mm` and `force_N` are the units of `u` and `y`."""
+
+    runs: tuple[Series, ...]
+    T: float
+    depth_mm: float
+    force_N: float
+    measurements: tuple[Measurement, ...]
+    """As measured."""
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def weight(self) -> float:
+        """Grid samples that count."""
+        return float(sum(run.weight.sum() for run in self.runs))
+
+    def on_grid(self) -> list[Measurement]:
+        """The grid samples as measurements (empty cells left out)."""
+        out = []
+        for m, run in zip(self.measurements, self.runs, strict=True):
+            keep = run.has
+            t, F = run.time_s[keep], run.y[keep] * self.force_N
+            out.append(
+                Measurement(m.name, t, run.depth_mm[keep], t, F, m.fit_from_s, m.fit_to_s, m.marks, m.surface_std_mm)
+            )
+        return out
+
+
+def sampled(measurements: Sequence[Measurement], T: float | None = None) -> Data:
+    """The measurements on a grid of `T` seconds, or of `natural_time` where none is given.
+
+    Raises InputError as `identify.fit` does, for a T below the spacing of the samples, and for one that leaves fewer
+    than 20 of them.
+    """
+    checked = problem.build(measurements)
+    own = own_time(checked.measurements)
+    if T is None:
+        T = natural_time(checked.measurements)
+    elif not (np.isfinite(T) and T > 0):
+        raise InputError("--sample-time", f"{T:g} is no time", "Seconds, above 0.")
+    elif T < 0.999 * own:
+        raise InputError("--sample-time", f"{T:g} s is shorter than the {own:.4g} s between the samples")
+    runs = tuple(_series(m, T, checked.depth_mm, checked.force_N) for m in checked.measurements)
+    left = sum(float(run.weight.sum()) for run in runs)
+    if left < FEWEST:
+        raise InputError("--sample-time", f"{T:g} s leaves {left:.0f} samples to fit", f"At least {FEWEST} are needed.")
+    notes = list(checked.notes)
+    empty = sum(int((~run.has).sum()) for run in runs)
+    if empty:
+        notes.append(f"{empty} samples of the grid have no measured force (gaps) and do not count.")
+    return Data(runs, T, checked.depth_mm, checked.force_N, checked.measurements, tuple(notes))
+
+
+def own_time(measurements: Sequence[Measurement]) -> float:
+    """The spacing of the data: the larger of the median steps of force and position, s."""
+    steps = [float(np.median(np.diff(t))) for m in measurements for t in (m.force_time_s, m.position_time_s)]
+    return _round(max(steps))
+
+
+def natural_time(measurements: Sequence[Measurement]) -> float:
+    """The sample time where none is given: a whole multiple of the data's own spacing, near `SPAN`/1000 of the run.
+
+    Two pulls against each other: noise on the force moves the poles of an ARX fit, the more the shorter T; and within T
+    nothing must relax, as the zero-order hold has it.
+    """
+    own = own_time(measurements)
+    longest = max(float(m.force_time_s[-1] - m.force_time_s[0]) for m in measurements)
+    return _round(own * max(1, round(min(longest / 2000, 0.01) / own)))
+
+
+def _round(T: float) -> float:
+    """Without the rounding of stamps: six digits."""
+    return float(f"{T:.6g}")
+
+
+def _series(m: Measurement, T: float, depth_mm: float, force_N: float) -> Series:
+    own = float(np.median(np.diff(m.force_time_s)))
+    edge = m.force_time_s[0] - min(own, T) / 2  # edges fall between samples
+    owner = np.floor((m.force_time_s - edge) / T + 1e-6).astype(np.intp)
+    K = int(owner[-1]) + 1
+    time = edge + T * (np.arange(K) + 0.5)
+    here = np.bincount(owner, minlength=K)
+    has = here > 0
+    empty = np.flatnonzero(~has)
+    counted = (m.force_time_s >= m.fit_from_s) & (m.force_time_s <= m.fit_to_s)
+    weight = (has & (np.bincount(owner, counted, K) == here)).astype(float)
+    y = np.zeros(K)
+    y[has] = (np.bincount(owner, m.force_N / force_N, K) / np.maximum(here, 1))[has]
+    nodes = np.concatenate([m.force_time_s, time[empty]])
+    cells = np.concatenate([owner, empty])
+    position = np.interp(nodes, m.position_time_s, m.position_mm)
+    count = np.maximum(here, 1).astype(float)
+    mean = np.bincount(cells, position, K) / count
+    if len(nodes) == K:  # one a cell: in the order of the cells, so that nothing need be averaged
+        order = np.argsort(cells, kind="stable")
+        cells, position = cells[order], position[order]
+    return Series(time, y, has, weight, np.ascontiguousarray(position / depth_mm), cells, count, mean)
