@@ -70,13 +70,23 @@ class ModbusClient:
     """Builds the exchanges with one device on a link.
 
     `turnaround_s` is the longest time the device may take before its reply begins; wire time is added to it.
+    `reply_delay_s` is how long the device is known to hold a finished reply back: it looked before that.
     """
 
-    def __init__(self, link: Link, address: int, *, transport: Transport = "rtu", turnaround_s: float = 0.025) -> None:
+    def __init__(
+        self,
+        link: Link,
+        address: int,
+        *,
+        transport: Transport = "rtu",
+        turnaround_s: float = 0.025,
+        reply_delay_s: float = 0.0,
+    ) -> None:
         self.link = link
         self.address = address
         self.transport = transport
         self.turnaround_s = turnaround_s
+        self.reply_delay_s = reply_delay_s
         self._decoder = DecodePDU(False)
         self._framer = FramerRTU(self._decoder) if transport == "rtu" else FramerSocket(self._decoder)
         self._transaction = 0
@@ -190,9 +200,10 @@ class ModbusClient:
         return Exchange(name, frame, length, parse, timeout_s, repeatable)
 
     def middle_s(self, sent_s: float, received_s: float, request_size: int, reply_size: int) -> float:
-        """When the device looked: the middle between the last byte of the request and the first of the reply."""
+        """When the device looked: the middle between the last byte of the request and the reply it then held back."""
         wire_s = self.link.wire_s
-        return 0.5 * (sent_s + wire_s(request_size) + received_s - wire_s(reply_size))
+        asked_s = sent_s + wire_s(request_size)
+        return 0.5 * (asked_s + max(asked_s, received_s - wire_s(reply_size) - self.reply_delay_s))
 
     # -- RTU ---------------------------------------------------------------------------------------------------
 

@@ -36,7 +36,11 @@ class RegisterMotor:
         self.map = device
         self.direction = direction
         self._modbus = ModbusClient(
-            link, address, transport=device.link.transport, turnaround_s=device.reply.turnaround_s + HOST_SLACK_S
+            link,
+            address,
+            transport=device.link.transport,
+            turnaround_s=device.reply.turnaround_s + HOST_SLACK_S,
+            reply_delay_s=1e-3 * device.reply.delay_ms,
         )
         self._signals = Signals(name, device, self._modbus)
         self._sequencer = Sequencer(self._signals, device.faults)

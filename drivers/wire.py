@@ -184,9 +184,11 @@ class Link:
             self._send_next(self.clock.now())
         return exchange
 
-    def drop_queue(self) -> None:
-        """Forget what is queued but not yet on the wire (a stop goes out before everything else)."""
+    def drop_queue(self) -> list[Exchange[Any]]:
+        """Forget what is queued but not on the wire (a stop goes out before everything else); returns what it was."""
+        dropped = list(self._queue)
         self._queue.clear()
+        return dropped
 
     def wake_at(self) -> float:
         """When `service` must be called although no byte came (bench clock); infinity if never."""

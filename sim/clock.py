@@ -20,7 +20,7 @@ VIRTUAL_EPOCH_NS = 1_767_225_600_000_000_000
 """Virtual time starts at 2026-01-01T00:00:00Z always: one seed, the same bytes."""
 
 WAKE_MARGIN_S = 6e-5
-"""A sleeping process wakes up to about this late; the last stretch before an event is spun."""
+"""A sleeping process wakes up about this late; the last stretch before an event is spun."""
 
 
 class Deadlock(RuntimeError):
@@ -94,7 +94,7 @@ class SimClock:
     def wait(self, ports: Sequence[Any], until_s: float) -> Sequence[Any]:
         """Return as soon as one of the ports has bytes to read, at the latest at `until_s`; returns those that have.
 
-        `ports` are pyserial ports (`frame_waiting`, `in_waiting`; on the wall clock those with a `fileno` are selected on).
+        `ports` are pyserial ports: `frame_waiting`, `in_waiting`; on the wall clock others are selected on.
         A frame wakes a waiting caller when its last byte has arrived, and not at each byte.
 
         Raises `Deadlock` on a virtual clock where `until_s` is infinite and nothing is scheduled.

@@ -21,6 +21,9 @@ from numpy.typing import NDArray
 from sim.digital import Array, Filter, roots
 from sim.kernel import ramp_gain
 
+Hold = Literal["zero_order", "ramp"]
+"""What the elastic force does between samples: stands still, or is linear."""
+
 TOLERANCE = 1e-9
 """Share of a step's force below which a difference counts as none."""
 
@@ -54,7 +57,7 @@ class _Mode:
 
 
 def relaxation_of(
-    filter: Filter, T: float, hold: Literal["zero_order", "ramp"] = "zero_order", *, tolerance: float = TOLERANCE
+    filter: Filter, T: float, hold: Hold = "zero_order", *, tolerance: float = TOLERANCE
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Shares and rates (1/s), rates descending, of the relaxation that `filter` samples every T seconds.
 
@@ -86,9 +89,7 @@ def relaxation_of(
     return shares, rates
 
 
-def is_relaxation(
-    filter: Filter, T: float = 1.0, hold: Literal["zero_order", "ramp"] = "zero_order", *, tolerance: float = TOLERANCE
-) -> bool:
+def is_relaxation(filter: Filter, T: float = 1.0, hold: Hold = "zero_order", *, tolerance: float = TOLERANCE) -> bool:
     """Whether `relaxation_of` finds one."""
     try:
         relaxation_of(filter, T, hold, tolerance=tolerance)
@@ -123,7 +124,10 @@ def _fault(mode: _Mode, tolerance: float) -> str:
 
 
 def _step_response(filter: Filter, tolerance: float) -> tuple[_Mode, list[_Mode], float]:
-    """The term at z = 1, the others that are there, and all that rounding leaves open of them; raises NotARelaxation where there is no such sum."""
+    """The term at z = 1, the others that are there, and all that rounding leaves open of the shares.
+
+    Raises NotARelaxation where the step response is no such sum.
+    """
     a, b = np.trim_zeros(np.array(filter.a), "b"), np.trim_zeros(np.array(filter.b), "b")
     if b.size > a.size:
         extra = f"l = {b.size - 1} is more than r = {a.size - 1}"

@@ -18,13 +18,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sim.digital import Array, Complex, Filter
-from sim.inverse import NotARelaxation, is_relaxation, relaxation_of
+from sim.inverse import Hold, NotARelaxation, is_relaxation, relaxation_of
 from sim.kernel import ramp_gain
 
 __all__ = [
@@ -40,8 +39,6 @@ __all__ = [
     "transfer_function",
     "zero_order_hold",
 ]
-
-Hold = Literal["zero_order", "ramp"]
 
 
 def transfer_function(shares: Sequence[float], rates: Sequence[float]) -> tuple[Array, Array]:

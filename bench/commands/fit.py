@@ -23,6 +23,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_structure(parser)
     add_columns(parser)
+    parser.add_argument(
+        "--sample-time", type=float, metavar="T", help="seconds, for a discrete method (default: from the data)"
+    )
+    parser.add_argument("--starts", type=int, metavar="N", help="noniterative: how many starts (default: 5)")
+    parser.add_argument(
+        "--ramps", choices=["recovered", "all"], help="fast: the rising ramps that show the elastic law"
+    )
     parser.add_argument("--json", metavar="OUT", help="write fit.json there; - for standard output, and nothing else")
     parser.add_argument("--write", type=Path, metavar="MODEL", help="write the fitted model as YAML")
     parser.add_argument("--report", type=Path, metavar="HTML", help="write a report page of the first DATA")
@@ -47,6 +54,8 @@ def main(args: argparse.Namespace) -> int:
             contact=args.contact,
             degree=args.degree,
             progress=progress,
+            sample_time=args.sample_time,
+            **{name: getattr(args, name) for name in ("starts", "ramps") if getattr(args, name) is not None},
         )
     text = json.dumps(result.to_json(), indent=2)
     if args.json == "-":

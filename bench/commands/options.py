@@ -25,7 +25,10 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
 def add_structure(parser: argparse.ArgumentParser) -> None:
     """What is fitted: law, order, contact."""
     parser.add_argument(
-        "--method", default="continuous", help="continuous (default): simulation error, continuous time"
+        "--method",
+        default="continuous",
+        help="continuous (default): simulation error, continuous time; the paper's noniterative, iterative, fast; "
+        "iv (iterative, unbiased); recursive (as while the run goes on)",
     )
     parser.add_argument("--law", default="auto", help="exponential, power, polynomial or auto (default)")
     parser.add_argument("--order", default="auto", help="relaxation modes: 1 to 4 or more, or auto (default)")

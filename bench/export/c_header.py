@@ -33,6 +33,7 @@ def c_header(
         raise InputError("--name", f"`{name}` is no C identifier", "letters, digits and _, a letter first")
     pad = real_time_pad(model, pad_only=pad_only)
     modes = pad.relaxation.order
+    c_0 = _filled(number(pad.relaxation.c_0), name)
     places = {
         "p": name,
         "P": name.upper(),
@@ -44,8 +45,8 @@ def c_header(
         "rates": _filled(array("rate", pad.relaxation.rates or (0.0,)), name),
         "lost": _filled(array("lost", [-math.expm1(-nu * T) for nu in pad.relaxation.rates] or (0.0,)), name),
         "gain": _filled(array("gain", [ramp_gain.python(nu * T) for nu in pad.relaxation.rates] or (0.0,)), name),
-        "c_0": _filled(number(pad.relaxation.c_0), name),
-        "let_go": _LET_GO.format(p=name, P=name.upper(), c_0=_filled(number(pad.relaxation.c_0), name)) if pad.unilateral else "",
+        "c_0": c_0,
+        "let_go": _LET_GO.format(p=name, P=name.upper(), c_0=c_0) if pad.unilateral else "",
     }
     return _comment(model, pad, rate_hz, name, source) + _CODE.format(**places)
 
@@ -68,8 +69,8 @@ def _comment(model: Model, pad: RealTimePad, rate_hz: float, name: str, source: 
         f"    force_N = {name}_step(&state, depth_mm);               // every {1.0 / rate_hz:g} s",
         f"    force_N = {name}_step_dt(&state, depth_mm, elapsed_s); // or with the time since the last step",
         "",
-        "Depth in mm, 0 at the surface, growing into the pad; force in N, positive in compression. The elastic force is",
-        "taken as linear between steps, and the filter is exact for that at any rate. The first step after a reset",
+        "Depth in mm, 0 at the surface, growing into the pad; force in N, positive in compression. The elastic force",
+        "is taken as linear between steps, and the filter is exact for that at any rate. The first step after a reset",
         "takes no time. A depth that is not a number, or makes the elastic force overflow, counts as the last one.",
         f"Numbers are float, or double where {name.upper()}_DOUBLE is defined before the header is read.",
         "",
@@ -94,7 +95,7 @@ def _safe(text: str | None) -> str:
     """Text that stands in a comment: one line of plain characters that cannot end it."""
     words = " ".join((text or "").split()).encode("ascii", "replace").decode()
     words = "".join(character if character.isprintable() else "?" for character in words)
-    return words.replace("\\", "/").replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
+    return words.replace("\\", "/").replace("?", ".").replace("*/", "* /").replace("/*", "/ *")
 
 
 _CONTACT = {

@@ -53,7 +53,7 @@ class LivePad:
     def step(self, delta_mm: float, dt_s: float) -> float:
         """Move to a depth within dt_s seconds; the force there, N. The first step after a reset takes no time.
 
-        Raises ValueError for a depth that is not finite and a time that is not or runs backwards, before anything moves.
+        Raises ValueError, before anything moves, for a depth or a time that is not finite, and a time below 0.
         """
         if not (math.isfinite(delta_mm) and 0.0 <= dt_s < math.inf):
             raise ValueError(f"no step to {delta_mm} mm within {dt_s} s: both must be finite, and time cannot fall")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bench.errors import InputError
 
@@ -14,8 +14,16 @@ if TYPE_CHECKING:
 
 __all__ = ["METHODS", "Evidence", "FitResult", "Parameter", "Trace", "fit"]
 
-METHODS: dict[str, str] = {"continuous": "continuous"}
-"""Method name -> module of this package with a function `fit(measurements, law, order, contact, degree, progress)`."""
+METHODS: dict[str, str] = {
+    "continuous": "continuous",
+    "noniterative": "discrete.noniterative",
+    "iterative": "discrete.iterative",
+    "fast": "discrete.fast",
+    "iv": "discrete.iv",
+    "recursive": "recursive",
+}
+"""Method name -> module of this package with a function `fit(measurements, law, order, contact, degree, progress)`;
+the discrete ones take `sample_time` too."""
 
 
 def fit(
@@ -26,12 +34,16 @@ def fit(
     contact: str = "auto",
     degree: int | None = None,
     progress: Callable[[str], None] | None = None,
+    sample_time: float | None = None,
+    **options: Any,
 ) -> FitResult:
     """Fit one pad model to one or more measurements.
 
     `law`: exponential (9), power (10), polynomial (14, of `degree`) or auto; `order`: number of relaxation modes r or
     auto; `contact`: bonded, unilateral or auto. `progress` is called with a few words as the work goes on.
-    Several measurements are runs of one pad, each from rest. Raises `bench.errors.InputError` for a name that is not
+    `sample_time`: T in s of a discrete method; None: from the data. `options`: further arguments of the method's own
+    `fit` (`starts` of noniterative, `ramps` and `step` of fast). Several measurements are runs of one pad, each from
+    rest. Raises `bench.errors.InputError` for a name that is not
     known and for data that cannot be fitted at all (too few samples, no contact, no force, times out of order).
     """
     from importlib import import_module
@@ -39,6 +51,21 @@ def fit(
     if method not in METHODS:
         raise InputError("--method", f"there is no method `{method}`", f"One of: {', '.join(METHODS)}.")
     runs = list(measurements) if isinstance(measurements, Sequence) else [measurements]
+    if sample_time is not None:
+        if not METHODS[method].startswith("discrete."):
+            raise InputError("--sample-time", f"the {method} method takes the data at their own times")
+        options["sample_time"] = sample_time
     module = import_module(f".{METHODS[method]}", __package__)
-    result: FitResult = module.fit(runs, law=law, order=order, contact=contact, degree=degree, progress=progress)
+    _check(module.fit, method, options)
+    result: FitResult = module.fit(
+        runs, law=law, order=order, contact=contact, degree=degree, progress=progress, **options
+    )
     return result
+
+
+def _check(function: Callable[..., FitResult], method: str, options: dict[str, Any]) -> None:
+    from inspect import signature
+
+    for name in options:
+        if name not in signature(function).parameters:
+            raise InputError("--" + name.replace("_", "-"), f"the {method} method has no such argument")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ._kernel import Array
 from .motion import holds
 from .problem import Problem, Run
 
@@ -64,7 +63,7 @@ def _blocks(run: Run, stretches: list[slice], length: int, growth: float) -> NDA
 
 def _averaged(run: Run, owner: NDArray[np.intp]) -> Run:
     count = np.bincount(owner).astype(float)
-    weight: Array = np.bincount(owner, run.weight)
+    weight = np.asarray(np.bincount(owner, run.weight), dtype=np.float64)
     time = np.bincount(owner, run.time_s) / count
     u = np.bincount(owner, run.u) / count
     with np.errstate(invalid="ignore"):

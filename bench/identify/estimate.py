@@ -14,6 +14,7 @@ from .solver import Solution, minimise
 from .starts import Bounds
 
 MERGED = 1.25  # rates nearer than this are one mode
+NOTHING = 1e-6  # of the largest force: a gain below it is no stiffness at all
 
 
 @dataclass(frozen=True)
@@ -29,24 +30,26 @@ class Estimate:
 
     @property
     def distinct(self) -> bool:
-        """Whether every mode is there: no share at zero, no two rates the same."""
+        """Whether every mode is there: no share at zero, no two rates the same, none at the edge of what the data see
+        (a mode faster than the samples stands for something else: a late force, a viscous part)."""
         _, rates, weights = self.structure.split(self.x)
-        total = weights.sum()
         apart = bool(np.all(rates[:-1] >= MERGED * rates[1:]))
-        return apart and bool(np.all(weights[1:] > 1e-6 * total))
+        seen = bool(np.all((rates > 1.001 * self.bounds.slowest) & (rates < 0.999 * self.bounds.fastest)))
+        return apart and seen and bool(np.all(weights[1:] > 1e-6 * weights.sum()))
 
     @property
     def physical(self) -> bool:
         """Shares ≥ 0 and rates > 0 by construction; a positive gain and an elastic response that never falls."""
         theta, _, weights = self.structure.split(self.x)
-        return bool(weights.sum() > 0) and self.structure.family.rising(theta)
+        return bool(weights.sum() > NOTHING) and self.structure.family.rising(theta)
 
 
 def search(problem: Problem, structure: Structure, starts: list[Array], bounds: Bounds) -> Estimate:
     """The best minimum reached from the starts: each a few steps, the best two to the end."""
     rough = [_solve(problem, structure, x, bounds, max_steps=12, tolerance=1e-4) for x in starts]
     rough.sort(key=lambda s: s.cost)
-    ended = [_solve(problem, structure, s.x, bounds, max_steps=60, tolerance=1e-8) for s in _different(rough)[:2]]
+    near = [s for s in _different(rough)[:2] if s.cost <= 1.3 * rough[0].cost]
+    ended = [_solve(problem, structure, s.x, bounds, max_steps=60, tolerance=1e-8) for s in near]
     return _ordered(structure, min(ended, key=lambda s: s.cost), bounds)
 
 

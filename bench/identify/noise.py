@@ -63,9 +63,9 @@ def _about_curve(t: Array, y: Array) -> tuple[Array, float]:
     if n < 8:
         return np.zeros(0), 0.0
     terms = int(np.clip(n // 8, 1, 7))
-    span, step = t[-1] - t[0], (t[-1] - t[0]) / n
+    span, quick = t[-1] - t[0], t[2] - t[0]
     basis = [np.ones(n), (t - t[0]) / span]
-    basis += [np.exp(-(t - t[0]) / tau) for tau in np.geomspace(3 * step, span / 2, terms)]
+    basis += [np.exp(-(t - t[0]) / tau) for tau in np.geomspace(1.5 * quick, span / 2, terms)]
     A = np.stack(basis, axis=1)
     solution, _, rank, _ = np.linalg.lstsq(A, y - y.mean(), rcond=1e-9)
     return y - y.mean() - A @ solution, float(n - rank)

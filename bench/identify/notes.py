@@ -7,7 +7,7 @@ import numpy as np
 from bench.recording.types import Measurement
 
 from ._kernel import Array
-from .estimate import Estimate
+from .estimate import NOTHING, Estimate
 from .motion import holds
 from .noise import Noise
 from .problem import Problem
@@ -50,7 +50,7 @@ def _about(m: Measurement, noise: Noise, unilateral: bool) -> list[str]:
         )
     out += _level_notes(m, depth, noise, top, unilateral)
     if deepest.any() and float(depth.max()) > 0:
-        rising = np.flatnonzero(np.abs(force - _first_level(force)) > max(8 * noise.force_N, 0.01 * top))
+        rising = np.flatnonzero(np.abs(force - _first_level(force, depth)) > max(8 * noise.force_N, 0.01 * top))
         start = depth[rising[0]] / depth.max() if len(rising) else 0.0
         if start > 0.3:
             out.append(
@@ -60,13 +60,15 @@ def _about(m: Measurement, noise: Noise, unilateral: bool) -> list[str]:
     return out
 
 
-def _first_level(force: Array) -> float:
-    return float(np.mean(force[: max(3, min(20, len(force) // 50))]))
+def _first_level(force: Array, depth: Array) -> float:
+    """Mean force before the motion begins, over at most 20 samples."""
+    still = np.abs(depth[:20] - depth[0]) <= 0.005 * np.ptp(depth)
+    count = len(still) if still.all() else int(np.argmin(still))
+    return float(np.mean(force[: max(count, 1)]))
 
 
 def _level_notes(m: Measurement, depth: Array, noise: Noise, top: float, unilateral: bool) -> list[str]:
-    count = max(3, min(20, len(depth) // 50))
-    start, begun = _first_level(m.force_N), float(np.mean(depth[:count]))
+    start, begun = _first_level(m.force_N, depth), float(depth[0])
     large = max(6 * noise.force_N, 0.01 * top)
     if begun > 0.02 * depth.max() and abs(start) > large:
         return [
@@ -146,7 +148,7 @@ def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
     out = []
     _, rates, weights = estimate.structure.split(estimate.x)
     step, span = problem.times()
-    if weights.sum() <= 0:
+    if weights.sum() <= NOTHING:
         out.append("No positive stiffness fits these data: every parameter is lost.")
         return out
     slow = [1 / nu for nu, a in zip(rates, weights[1:], strict=True) if a > 0 and 1 / nu > 0.5 * span]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ._kernel import Array
-from .estimate import Estimate
+from .estimate import NOTHING, Estimate
 from .problem import Problem
 from .result import Parameter
 from .uncertainty import Spread
@@ -57,6 +57,10 @@ def _lost(estimate: Estimate) -> set[str]:
     lower, upper = estimate.bounds.of(structure)
     k, r = structure.family.size, structure.order
     out: set[str] = set()
+    if x[k + r :].sum() <= NOTHING:
+        return {name for name, _, _ in structure.family.physical_numbers(x[:k], 1.0, 1.0)} | {
+            f"{letter}_{i}" for letter in ("c", "nu") for i in range(1, r + 1)
+        }
     for i in range(1, r + 1):
         if x[k + r + i] <= 0:
             out |= {f"c_{i}", f"nu_{i}"}

@@ -17,7 +17,7 @@ from ._kernel import Array
 
 
 def force_zeroed(m: Measurement, first_samples: int) -> Measurement:
-    """Subtract the mean force of the first samples, which must be out of contact. Raises InputError for fewer than 3."""
+    """Subtract the mean force of the first samples, out of contact. Raises InputError for fewer than 3."""
     if not 3 <= first_samples <= len(m.force_N):
         raise InputError(m.name, f"{first_samples} samples cannot give the zero of the force")
     level = float(np.mean(m.force_N[:first_samples]))

@@ -28,23 +28,37 @@ class Pattern:
 
 
 def patterns(result: FitResult) -> list[Pattern]:
-    """All patterns, the strongest first; [] where the residual is within 1.2 times the noise floor."""
+    """All patterns, the strongest first; [] where the residual is within 1.2 times the noise floor.
+
+    Where the model does not describe the data at all, they are sought in the measured force itself.
+    """
     if result.rmse <= 1.2 * result.noise_floor:
         return []
-    tables = [_features(t) for t in result.traces]
-    residual = np.concatenate([t[1] for t in tables])
-    excess = float(np.sum(residual**2)) - len(residual) * result.noise_floor**2
+    foreign = is_foreign(result)
+    tables = [_features(t, foreign) for t in result.traces]
+    left = np.concatenate([t[1] for t in tables])
+    if foreign:
+        left = left - left.mean()
+    excess = float(np.sum(left**2)) - len(left) * result.noise_floor**2
     out = []
     for name, sentence in SENTENCES.items():
         columns = np.concatenate([t[0][name] for t in tables])
+        if foreign:
+            columns = columns - columns.mean(axis=0)
         span = np.linalg.norm(columns, axis=0)
-        columns = columns[:, span > 0] / span[span > 0]
-        if columns.shape[1] == 0:
+        columns = columns[:, span > 1e-9 * max(span.max(initial=0.0), 1e-300)]
+        if columns.shape[1] == 0 or span.max(initial=0.0) == 0:
             continue
-        solution = np.linalg.lstsq(columns, residual, rcond=1e-8)[0]
+        columns = columns / np.linalg.norm(columns, axis=0)
+        solution = np.linalg.lstsq(columns, left, rcond=1e-8)[0]
         taken = float(np.sum((columns @ solution) ** 2))
         out.append(Pattern(name, float(np.clip(taken / excess, 0.0, 1.0)), sentence))
     return sorted(out, key=lambda p: -p.share)
+
+
+def is_foreign(result: FitResult) -> bool:
+    """Whether the model explains next to nothing of the force: what was measured is no pad pressed in."""
+    return result.fit_percent < 30.0 or not result.physical
 
 
 def sentence(result: FitResult) -> str:
@@ -54,12 +68,48 @@ def sentence(result: FitResult) -> str:
     if not found:
         return f"Nothing plain: the error is {ratio:.2g} times the noise."
     told = [p for p in found if p.share >= TELLING][:2]
-    start = f"The error is {ratio:.2g} times the noise. "
+    if is_foreign(result):
+        start, what = "The model does not describe these data. ", "of the force's variation"
+    else:
+        start, what = f"The error is {ratio:.2g} times the noise. ", "of it"
     if not told:
-        return start + "It follows no simple pattern of motion, depth or time."
-    lines = [f"{100 * p.share:.0f} % of it {p.sentence}" for p in told]
-    return start + "; ".join(lines) + "."
+        return start + _where(result)
+    return start + "; ".join(f"{100 * p.share:.0f} % {what} {p.sentence}" for p in told) + "."
 
+
+def _where(result: FitResult) -> str:
+    """Where the residual is large, when it follows no pattern."""
+    power = {"corners": 0.0, "moves": 0.0, "holds": 0.0}
+    samples = dict(power)
+    for t in result.traces:
+        counted = np.flatnonzero(t.counted)
+        square = t.residual_N[counted] ** 2
+        still, corner = np.zeros(len(counted), dtype=bool), np.zeros(len(counted), dtype=bool)
+        corner[:CORNER] = True
+        for s in holds(t.time_s[counted], t.position_mm[counted]):
+            still[s] = True
+            for edge in (s.start, s.stop):
+                corner[max(edge - CORNER, 0) : edge + CORNER] = True
+        for name, mask in (("corners", corner), ("moves", ~still & ~corner), ("holds", still & ~corner)):
+            power[name] += float(square[mask].sum())
+            samples[name] += float(mask.sum())
+    total, count = max(sum(power.values()), 1e-300), max(sum(samples.values()), 1.0)
+    for name, line in PLACES.items():
+        share, part = power[name] / total, samples[name] / count
+        if share >= 0.6 and share > 1.3 * part:
+            return f"{100 * share:.0f} % of it {line.format(part=100 * part)}"
+    return "It follows no simple pattern of motion, depth or time, and is everywhere."
+
+
+CORNER = 5  # samples on either side of where a move begins or ends
+
+PLACES = {
+    "corners": "stands where moves begin and end ({part:.0f} % of the samples): stamps of position and force that do"
+    " not agree, or corners between samples.",
+    "moves": "lies in the moves ({part:.0f} % of the samples) and follows no simple pattern there: shaking of the drive,"
+    " or a reported position that is not the true one.",
+    "holds": "lies in the holds ({part:.0f} % of the samples) and follows no simple pattern there.",
+}
 
 SENTENCES = {
     "level": "is a constant offset of the force",
@@ -74,11 +124,12 @@ SENTENCES = {
 }
 
 
-def _features(t: Trace) -> tuple[dict[str, Array], Array]:
-    """Regressors of every pattern, (n, k) each, and the residual (n,), over the samples that count."""
+def _features(t: Trace, foreign: bool) -> tuple[dict[str, Array], Array]:
+    """Regressors of every pattern, (n, k) each, and the residual (n,) (or the force), over the samples that count."""
     counted = np.flatnonzero(t.counted)
     stride = max(1, len(counted) // MOST)
-    time, depth, model = t.time_s[counted], t.position_mm[counted], t.simulated_N[counted]
+    time, depth = t.time_s[counted], t.position_mm[counted]
+    model = np.zeros(len(time)) if foreign else t.simulated_N[counted]
     still = np.zeros(len(time), dtype=bool)
     since = np.zeros(len(time))
     for s in holds(time, depth):
@@ -104,7 +155,7 @@ def _features(t: Trace) -> tuple[dict[str, Array], Array]:
         "late": _slope(time, model)[:, None],
         "holds": np.stack([still * relaxing * h for h in hats.T], axis=1),
     }
-    error = t.residual_N[counted]
+    error = (t.force_N if foreign else t.residual_N)[counted]
     return {k: v[::stride] for k, v in columns.items()}, error[::stride]
 
 

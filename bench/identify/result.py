@@ -102,6 +102,14 @@ class FitResult:
     """How many independent samples the residual is worth (its colour)."""
     covariance: Array | None = None
     """Of `parameters`, in their order."""
+    iterations: int | None = None
+    """Of the scheme, where it counts them."""
+    history: dict[str, list[float]] = field(default_factory=dict)
+    """How it converged: V in N² and the numbers by name, one entry an iteration (`recursive`: at `time_s`)."""
+    attempts: list[dict[str, float]] = field(default_factory=list)
+    """Where each start led, best first, for a scheme with several: V in N², converged, iterations, the numbers."""
+    figures: dict[str, float] = field(default_factory=dict)
+    """Further numbers of the scheme, by name."""
 
     @property
     def rmse(self) -> float:
@@ -131,7 +139,8 @@ class FitResult:
         return self.traces[0].residual_N
 
     def to_json(self) -> dict[str, Any]:
-        """fit.json, as contracts.md has it."""
+        """fit.json, as contracts.md has it; a scheme that counts its iterations adds them and V along the way."""
+        more = {} if self.iterations is None else {"iterations": self.iterations, "history": self.history.get("V", [])}
         return {
             "method": self.method,
             "law": self.law,
@@ -150,4 +159,5 @@ class FitResult:
             "held_out_rmse": self.held_out_rmse if math.isfinite(self.held_out_rmse) else None,
             "samples": self.samples,
             "seconds": self.seconds,
+            **more,
         }

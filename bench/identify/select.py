@@ -72,17 +72,18 @@ def choose(
     bounds = bounds_of(problem)
     ladders = {True: [Ladder(short, f, True, bounds) for f in families] if True in contacts else [],
                False: [Ladder(short, f, False, bounds) for f in families] if False in contacts else []}  # fmt: skip
+    exact = len(orders) == 1
     first = min(max(min(orders), 2), max(orders))
     for unilateral in contacts:
         if not unilateral and True in contacts and not _lets_go(short, ladders[True]):
             continue  # the two contacts are one model
         for ladder in ladders[unilateral]:
             progress(f"{ladder.name}, {'unilateral' if unilateral else 'bonded'}, order 1 to {first}")
-            ladder.climb(first)
+            ladder.climb(first, exact)
     for ladder in _worth_climbing(ladders):
         if max(orders) > first:
             progress(f"{ladder.name}, order {first + 1} to {max(orders)}")
-        ladder.climb(max(orders))
+        ladder.climb(max(orders), exact)
     estimates = [e for side in ladders.values() for ladder in side for e in ladder.found if e.structure.order in orders]
     candidates = [Candidate(e, e.cost / problem.weight) for e in estimates]
     lowest = min(candidates, key=lambda c: c.V)
@@ -130,14 +131,21 @@ class Ladder:
         self.found: list[Estimate] = []
         self._starter = Starter(problem, family, unilateral, bounds)
 
-    def climb(self, order: int) -> None:
-        """Fit up to `order`."""
-        while len(self.found) < order:
+    def climb(self, order: int, to_the_end: bool) -> None:
+        """Fit up to `order`; unless `to_the_end`, no further than where one mode more gains nothing at all."""
+        while len(self.found) < order and (to_the_end or not self._idle()):
             r = len(self.found) + 1
             starts = self._starter.first(r)
             if self.found:
                 starts += self._starter.next(self.found[-1].structure, self.found[-1].x)
             self.found.append(search(self.problem, Structure(self.family, r, self.unilateral), starts, self.bounds))
+
+    def _idle(self) -> bool:
+        if len(self.found) < 2:
+            return False
+        before, last = (max(e.cost, 1e-300) for e in self.found[-2:])
+        # Two parameters must lower n_e ln V by 2 ln n_e; n_e is at most the number of samples.
+        return self.problem.weight * float(np.log(before / last)) < 2.0
 
 
 def _worth_climbing(ladders: dict[bool, list[Ladder]]) -> list[Ladder]:

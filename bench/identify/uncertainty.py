@@ -43,9 +43,9 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
     by_colour = inverse @ _coloured(sensitivity, gamma) @ inverse
     independent = total / _memory(gamma)
     freedom = min(independent / max(independent - free.sum(), 1.0), 3.0)  # what the fit itself took out of the residual
-    widest = np.sqrt(np.maximum(np.diag(by_scores), np.diag(by_colour)) * freedom)
+    widest = np.sqrt(np.maximum(np.maximum(np.diag(by_scores), np.diag(by_colour)), 0.0) * freedom)
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = np.where(np.diag(by_colour) > 0, widest / np.sqrt(np.diag(by_colour)), 1.0)
+        ratio = np.where(np.diag(by_colour) > 0, widest / np.sqrt(np.abs(np.diag(by_colour))), 1.0)
     covariance = by_colour * np.outer(ratio, ratio)
     for j, m in enumerate(problem.measurements):
         if m.surface_std_mm > 0:

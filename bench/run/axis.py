@@ -150,10 +150,15 @@ class Axis:
         self._curve = Braking(here, velocity, deceleration_mm_s2) if velocity else Rest(here)
         self._start_s = now
         if self.motor.kind == "move":
-            self.motor.link.drop_queue()
+            self.clear_queue()
             self._begin(self.motor.stop())
         else:
             self._next_s = now
+
+    def clear_queue(self) -> None:
+        """Forget commands and polls that are not yet on the wire."""
+        dropped = self.motor.link.drop_queue()
+        self._waiting = deque((exchange, at) for exchange, at in self._waiting if exchange not in dropped)
 
     def freeze(self, position_mm: float) -> None:
         """Take a position as commanded from now on (after a move motor was stopped where nobody planned it)."""

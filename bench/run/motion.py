@@ -78,7 +78,7 @@ class Mover:
             yield from self.settle()
 
     def settle(self, patience_s: float = 2.0) -> Script[None]:
-        """Wait until a move motor's polls agree that it stands, and take that position as commanded."""
+        """Wait until the measured positions agree that the axis stands; a move motor's is then what is commanded."""
         loop = self.loop
         give_up = self.clock.now() + patience_s
         last = math.nan
@@ -91,7 +91,7 @@ class Mover:
                     break
                 last = position
             yield
-        if loop.last_motor is not None:
+        if loop.last_motor is not None and self.axis.motor.kind == "move":
             self.axis.freeze(loop.last_motor.position_mm)
 
     def watch(self) -> Window:

@@ -26,6 +26,9 @@ from drivers.motor import MotorLimits, MotorSample
 SLOW_MM_S = 5.0
 """Speed of moves that no protocol asks for (backing off before the tare, retracting after a stop)."""
 
+INSIDE_MM = 0.05
+"""How far inside the travel an axis is set that was homed outside of it."""
+
 STOP_PATIENCE_S = 1.0
 """How long a stopping axis is waited for before the safe state is applied all the same."""
 
@@ -102,11 +105,8 @@ class Run:
         if not homed:
             self.label = "homing"
             loop.axis.go_silent()
-            loop.monitor.watch_following = False
             yield from loop.perform(motor.home())
-            yield from self._go_live()
-            loop.monitor.watch_following = True
-            loop.sink.event(self.clock.now(), "homed", {})
+            yield from self._enter_travel()
 
     def meet_pad(self, approach: Approach) -> Script[None]:
         """Tare in air, find the surface, go to where step 1 starts."""
@@ -170,7 +170,7 @@ class Run:
         self.label = "stopping"
         if loop.axis.live:
             give_up = self.clock.now() + STOP_PATIENCE_S
-            self.motor.link.drop_queue()
+            loop.axis.clear_queue()
             loop.axis.halt(self.bench.limits.acceleration)
             while not loop.axis.ended(self.clock.now()) and self.clock.now() < give_up:
                 yield
@@ -193,6 +193,24 @@ class Run:
         loop.last_motor = sample
         loop.axis.go_live(sample.position_mm)
         loop.monitor.expect_motor_from(self.clock.now())
+
+    def _enter_travel(self) -> Script[None]:
+        """After homing: from the end of the axis to the near end of the travel allowed, slowly.
+
+        Before it was homed, nobody knew where the axis stood, and its home may lie outside the limits.
+        """
+        loop = self.loop
+        envelope = loop.monitor.envelope
+        allowed = envelope.position_mm
+        stroke = self.bench.motor.stroke
+        envelope.position_mm = (min(stroke[0], allowed[0]), max(stroke[1], allowed[1]))
+        yield from self._go_live()
+        home_mm = self.mover.here()
+        inside = (allowed[0] + INSIDE_MM, allowed[1] - INSIDE_MM)
+        yield from self.mover.go(min(max(home_mm, inside[0]), inside[1]), SLOW_MM_S)
+        yield from self.mover.settle()
+        envelope.position_mm = allowed
+        loop.sink.event(self.clock.now(), "homed", {"home_mm": home_mm, "position_mm": self.mover.here()})
 
     def _retract(self) -> Script[None]:
         """Out of the pad, slowly, as far as where the run started or the travel ends."""

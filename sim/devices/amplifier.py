@@ -61,7 +61,7 @@ class Amplifier:
         if decimals is None:
             decimals = max(0, min(3, math.floor(math.log10(999_999 / fullest))))
         self.set_decimals(decimals)
-        self.max_counts: int = min(999_999, round(fullest * 10**decimals))
+        self.max_counts = int(min(999_999, round(fullest * 10**decimals)))
         self.min_counts = -self.max_counts
         self.step = 1
         self.filter_level = 0
@@ -133,7 +133,7 @@ class Amplifier:
 
     def over_range(self, counts: int) -> int:
         """+1 over range, -1 under range, 0 within."""
-        return (counts > self.max_counts) - (counts < self.min_counts)
+        return int(counts > self.max_counts) - int(counts < self.min_counts)
 
     # -- zero and tare (refused while the weight moves, manual p. 38) --------------------------------------------
 

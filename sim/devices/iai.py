@@ -3,8 +3,8 @@
 Not documented there, and chosen here: alarm codes (0x80 move with the servo off, 0x81 table move and 0x83 direct
 move before homing, 0x84 move while homing, 0xA2 empty table row, 0xA3 position, speed or acceleration outside
 what the axis can); commands while the switch PMSL gives the PIO the say are answered and ignored; the commanded
-values of the 9900 block are kept between moves; 100 % push is the drive's full force, 1000 mA; functions 07 and
-11h are refused; values are taken when a request has arrived.
+values of the 9900 block are kept between moves; homing ends at the zero of the bench's motor frame; 100 % push is
+the drive's full force, 1000 mA; functions 07 and 11h are refused; values are taken when a request has arrived.
 """
 
 from __future__ import annotations

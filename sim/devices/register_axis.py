@@ -6,11 +6,12 @@ subclass of `RegisterAxis` that says what its addresses mean, and drives a `Move
 
 from __future__ import annotations
 
-from sim.devices.drive import Drive
+from sim.devices.drive import TICK_S, Drive
 from sim.devices.modbus import ILLEGAL_ADDRESS, Refusal
 
 G_mm_s2 = 9806.65
 HOMING_mm_s = 20.0
+HOMING_mm_s2 = 500.0
 PUSHING_mm_s = 20.0
 REACHED_mm = 0.005
 PUSH_SETTLE_S = 0.255
@@ -86,8 +87,8 @@ def high_first(address: int, value: int) -> dict[int, int]:
 class Mover:
     """Servo, homing, moves, pushes, pause: the motion side of such a controller, in motor-frame millimetres.
 
-    Homing goes to the lower end of the stroke (away from the pad) until the stop is felt; from then on the
-    controller counts in the motor frame. Before, it counts from where it was switched on.
+    Homing goes to the lower end of the stroke (away from the pad) until the stop is felt, then to the zero of the
+    motor frame (the controller's home offset), and is complete there. Before, it counts from where it was switched on.
     """
 
     def __init__(self, drive: Drive) -> None:
@@ -118,26 +119,33 @@ class Mover:
         self.servo_on = on
 
     def home(self, at_s: float) -> None:
-        """Find the lower end."""
+        """Find the lower end, and go from there to zero."""
         self._forget()
         self.homing = True
         self.homed = False
-        low_mm = self.plant.settings.stroke_mm[0]
+        low_mm, high_mm = self.plant.settings.stroke_mm
+        zero_mm = min(max(0.0, low_mm), high_mm)
         setpoint_mm = self.plant.position_mm
 
-        def act(now_s: float) -> bool:
+        def search(now_s: float) -> bool:
             nonlocal setpoint_mm
             if self.plant.at_end_stop >= 0:
-                setpoint_mm -= HOMING_mm_s * 1e-3
+                setpoint_mm -= HOMING_mm_s * TICK_S
                 self.plant.hold(setpoint_mm)
                 return True
-            self.plant.hold(low_mm)
             self.drive.zero_mm = 0.0
-            self.homing = False
-            self.homed = True
+            self.drive.hold(low_mm)
+            self.drive.every_tick(now_s, arrive)
+            self.plant.profile(zero_mm, HOMING_mm_s, HOMING_mm_s2)
             return False
 
-        self.drive.every_tick(at_s, act)
+        def arrive(now_s: float) -> bool:
+            if self.plant.moving:
+                return True
+            self.homing, self.homed = False, True
+            return False
+
+        self.drive.every_tick(at_s, search)
 
     def move(self, target_mm: float, speed_mm_s: float, acceleration_mm_s2: float, band_mm: float) -> None:
         """Start a trapezoid."""

@@ -2,11 +2,12 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Any
 
 import pytest
 
 from sim.axis import BenchPlant
-from tests.sim.world_tools import DAD, SPRING, SPRING_N_mm, Client, bench
+from tests.sim.world_tools import DAD, SPRING, Client, SPRING_N_mm, bench
 
 BYTE_S = 10 / 115200
 
@@ -28,7 +29,7 @@ def checksum(text: str) -> str:
     return f"{(256 - sum(map(ord, text)) % 256) % 256:02X}"
 
 
-def spring(world_settings: dict[str, object]) -> dict[str, object]:
+def spring(world_settings: dict[str, Any]) -> dict[str, Any]:
     return {"model": SPRING, "surface": 0.5} | world_settings
 
 
@@ -263,7 +264,7 @@ def test_range() -> None:
         ({"unit": "mN", "decimals": 0}, "G+001000"),
     ],
 )
-def test_units(spec: dict[str, object], reading: str) -> None:
+def test_units(spec: dict[str, Any], reading: str) -> None:
     # 1 N is 101.972 g; a scale of 2 means that the bench doubles what the device says
     with bench(load_cell=DAD | spec, **spring({})) as world:
         client = Client(world, "load_cell")

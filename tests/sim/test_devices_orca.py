@@ -6,7 +6,7 @@ import pytest
 
 from sim.devices.orca import Orca
 from sim.world import World
-from tests.sim.world_tools import SPRING, SPRING_N_mm, Client, bench, framed
+from tests.sim.world_tools import SPRING, Client, SPRING_N_mm, bench, framed
 
 BYTE_S = 11 / 115200
 NO_ERROR = 0
@@ -17,7 +17,7 @@ def stream(client: Client, code: int, value: int) -> tuple[int, int, int, int, i
     reply = client.ask(framed("01 64" + struct.pack(">Bi", code, value).hex()))
     assert len(reply) == 19
     assert reply[:2] == b"\x01\x64"
-    return struct.unpack(">iiHBHH", reply[2:-2])  # type: ignore[return-value]
+    return struct.unpack(">iiHBHH", reply[2:-2])
 
 
 def registers(client: Client, address: int, count: int = 1) -> list[int]:
@@ -68,7 +68,7 @@ def test_wire_time_of_a_stream_exchange_is_exact() -> None:
         client.clock.wait([client.port], 1.0)
         assert client.port.in_waiting == 19
         assert client.clock.now() == pytest.approx(28 * BYTE_S + 0.002, abs=1e-9)
-        assert 28 * BYTE_S == pytest.approx(2674e-6, abs=0.5e-6)
+        assert pytest.approx(2674e-6, abs=0.5e-6) == 28 * BYTE_S
 
 
 def test_position_command_moves_and_is_reported() -> None:

@@ -136,9 +136,7 @@ def test_a_network_device_is_served_on_a_socket() -> None:
 
 
 def test_serving_stops_when_told_and_takes_the_terminals_away() -> None:
-    settings = WorldSettings(
-        name="here", model=Model.from_dict(FREE_AIR), motor=ORCA, load_cell=DAD, clock="wall"
-    )
+    settings = WorldSettings(name="here", model=Model.from_dict(FREE_AIR), motor=ORCA, load_cell=DAD, clock="wall")
     out = io.StringIO()
     emulate.serve(World(settings), out, stopped=lambda: True)
     paths = dict(line.split() for line in out.getvalue().splitlines())

@@ -24,9 +24,7 @@ def make(baudrate: int = 19200, parity: str = "E", **options: bool | float) -> t
     return clock, line, device
 
 
-@pytest.mark.parametrize(
-    ("baudrate", "parity", "bits"), [(19200, "E", 11), (115200, "N", 10), (1_000_000, "O", 11)]
-)
+@pytest.mark.parametrize(("baudrate", "parity", "bits"), [(19200, "E", 11), (115200, "N", 10), (1_000_000, "O", 11)])
 def test_a_byte_is_ten_bits_and_eleven_with_parity(baudrate: int, parity: str, bits: int) -> None:
     assert byte_time_s(baudrate, parity) == bits / baudrate
 

@@ -120,7 +120,7 @@ def test_state_spaces_are_the_same_systems(hold: str) -> None:
     assert_allclose(
         state_space(SHARES, RATES).frequency_response(OMEGA), frequency_response(SHARES, RATES, OMEGA), rtol=1e-12
     )
-    omega = OMEGA[OMEGA < math.pi / T]
+    omega = np.geomspace(1e-3, 0.99 * math.pi / T, 40)
     space = state_space(SHARES, RATES, T, hold)  # type: ignore[arg-type]
     expected = HOLDS[hold](SHARES, RATES, T).frequency_response(omega, T)
     assert_allclose(space.frequency_response(omega), expected, rtol=1e-10)

@@ -12,17 +12,19 @@ from sim.model import Model
 from sim.world import World, WorldSettings, register, unregister
 
 SPRING_N_mm = 10.0
-FREE_AIR = {"pad": {"elastic": {"law": "none"}, "relaxation": {"shares": [], "rates": []}, "contact": "unilateral"}}
-SPRING = {
+FREE_AIR: dict[str, Any] = {
+    "pad": {"elastic": {"law": "none"}, "relaxation": {"shares": [], "rates": []}, "contact": "unilateral"}
+}
+SPRING: dict[str, Any] = {
     "pad": {
         "elastic": {"law": "polynomial", "alpha": [0.0, SPRING_N_mm]},
         "relaxation": {"shares": [], "rates": []},
         "contact": "unilateral",
     }
 }
-ORCA = {"driver": "orca", "baudrate": 115200, "gap_us": 2000, "stroke": (-20.0, 20.0)}
-IAI = {"driver": "iai", "baudrate": 38400, "stroke": (-20.0, 20.0)}
-DAD = {"driver": "dad141", "baudrate": 115200, "capacity": 50.0}
+ORCA: dict[str, Any] = {"driver": "orca", "baudrate": 115200, "gap_us": 2000, "stroke": (-20.0, 20.0)}
+IAI: dict[str, Any] = {"driver": "iai", "baudrate": 38400, "stroke": (-20.0, 20.0)}
+DAD: dict[str, Any] = {"driver": "dad141", "baudrate": 115200, "capacity": 50.0}
 
 
 def crc(data: bytes) -> bytes:
@@ -48,8 +50,8 @@ class Client:
         self.world = world
         self.clock = world.clock
         line = world.endpoints[key].line
-        options = {"baudrate": line.baudrate or 9600, "parity": line.parity} | options
-        self.port = serial.serial_for_url(f"sim://{world.settings.name}/{key}", timeout=0, **options)
+        settings: dict[str, Any] = {"baudrate": line.baudrate or 9600, "parity": line.parity}
+        self.port = serial.serial_for_url(f"sim://{world.settings.name}/{key}", timeout=0, **(settings | options))
 
     def ask(self, request: bytes, within_s: float = 0.2) -> bytes:
         """Send, wait until the reply is complete (nothing more in 5 ms), return it; b"" where none comes."""

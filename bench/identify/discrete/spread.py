@@ -1,0 +1,108 @@
+"""Standard errors of the discrete estimates, for residuals of any colour."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sim.transfer import zero_order_hold
+
+from .._kernel import Array
+from .estimator import Estimator, Found
+from .series import Data
+from .system import Structure, simulate
+
+
+def covariance(data: Data, structure: Structure, estimator: Estimator, found: Found) -> Array:
+    """Of v (P, P): M⁻¹ S M⁻ᵀ, M the slope of the sums that the scheme sets to zero, S their variance.
+
+    S is summed over windows as long as the simulated residual remembers (Bartlett's kernel). What a scheme gets wrong
+    by construction (ARX under output noise) is in no standard error. γ from data of its own (`fast`) is carried through.
+    """
+    scores = estimator.scores(data, structure, found.v)
+    S = _windowed(scores, memory(data, structure, found.v))
+    M = _slope(data, structure, estimator, found.v)
+    g = structure.nonlinear
+    if found.gamma_covariance is None:
+        inverse = _inverse(M)
+        return inverse @ S @ inverse.T
+    inverse = _inverse(M[g:, g:])
+    by_gamma = -inverse @ M[g:, :g]
+    out = np.zeros_like(S)
+    out[:g, :g] = found.gamma_covariance
+    out[g:, :g] = by_gamma @ found.gamma_covariance
+    out[:g, g:] = out[g:, :g].T
+    out[g:, g:] = inverse @ S[g:, g:] @ inverse.T + by_gamma @ found.gamma_covariance @ by_gamma.T
+    return out
+
+
+def memory(data: Data, structure: Structure, v: Array) -> int:
+    """Samples after which the residual's autocorrelation has fallen below a tenth, times two; at least 1."""
+    longest = 1
+    for run in data.runs:
+        e = run.weight * (run.y - simulate(run, structure, v).force)
+        n = len(e)
+        size = 1 << int(np.ceil(np.log2(2 * n)))
+        gamma = np.fft.irfft(np.abs(np.fft.rfft(e, size)) ** 2, size)[: max(n // 4, 1)]
+        if gamma[0] <= 0:
+            continue
+        small = np.flatnonzero(gamma < 0.1 * gamma[0])
+        longest = max(longest, 2 * int(small[0]) - 1 if len(small) else n // 4)
+    return longest
+
+
+def independent(data: Data, structure: Structure, v: Array) -> float:
+    """How many independent samples the residual is worth; at least ten."""
+    return max(2 * data.weight / (memory(data, structure, v) + 1), 10.0)
+
+
+def relaxation_jacobian(shares: list[float], rates: list[float], T: float) -> Array:
+    """∂(a_1 … a_r, b_1 … b_r)/∂(c_1 … c_r, ν_1 … ν_r) of the zero-order hold, (2r, 2r)."""
+    x = np.array([*shares, *rates])
+    r = len(shares)
+    out = np.empty((2 * r, 2 * r))
+    for j in range(2 * r):
+        h = 1e-5 * x[j] if j >= r else 1e-5
+        sides = []
+        for sign in (1, -1):
+            y = x.copy()
+            y[j] += sign * h
+            filter = zero_order_hold(y[:r].tolist(), y[r:].tolist(), T)
+            sides.append(np.array([*filter.a[1:], *filter.b[1:]]))
+        out[:, j] = (sides[0] - sides[1]) / (2 * h)
+    return out
+
+
+def _slope(data: Data, structure: Structure, estimator: Estimator, v: Array) -> Array:
+    P = structure.size
+    out = np.empty((P, P))
+    for j in range(P):
+        h = 1e-6 * max(abs(v[j]), 1e-4)
+        sums = []
+        for sign in (1, -1):
+            near = v.copy()
+            near[j] += sign * h
+            sums.append(sum((s.sum(axis=0) for s in estimator.scores(data, structure, near)), np.zeros(P)))
+        out[:, j] = (sums[0] - sums[1]) / (2 * h)
+    return out
+
+
+def _inverse(M: Array) -> Array:
+    rows = np.linalg.norm(M, axis=1)
+    rows[rows == 0] = 1.0
+    columns = np.linalg.norm(M / rows[:, None], axis=0)
+    columns[columns == 0] = 1.0
+    scaled: Any = np.linalg.pinv(M / rows[:, None] / columns, rcond=1e-14)
+    return np.asarray(scaled / columns[:, None] / rows)
+
+
+def _windowed(scores: list[Array], width: int) -> Array:
+    """Σ_kl w(k−l) g_k g_lᵀ with Bartlett's w, by sums over all windows of `width` samples."""
+    out = np.zeros((scores[0].shape[1],) * 2)
+    for g in scores:
+        padded = np.concatenate([np.zeros((width, g.shape[1])), g, np.zeros((width - 1, g.shape[1]))])
+        sums = np.cumsum(padded, axis=0)
+        windows = sums[width:] - sums[:-width]
+        out += windows.T @ windows / width
+    return out
