@@ -23,6 +23,7 @@ COMMANDS = {
     "compare": "several runs side by side",
     "convert": "MCAP to CSV and back",
     "recover": "make a whole recording of a torn one",
+    "export": "a fitted pad for other programs: C header for real-time loops, or JSON",
     "schema": "print the JSON schema of a protocol, bench or model file",
     "emulate": "serve a simulated bench's devices on pseudo-terminals",
 }

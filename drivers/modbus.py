@@ -203,6 +203,8 @@ class ModbusClient:
         """When the device looked: the middle between the last byte of the request and the reply it then held back."""
         wire_s = self.link.wire_s
         asked_s = sent_s + wire_s(request_size)
+        if asked_s >= received_s:  # faster than the wire: a pseudo-terminal or an adapter that has none
+            return 0.5 * (sent_s + received_s)
         return 0.5 * (asked_s + max(asked_s, received_s - wire_s(reply_size) - self.reply_delay_s))
 
     # -- RTU ---------------------------------------------------------------------------------------------------

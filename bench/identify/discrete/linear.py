@@ -18,6 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.digital import Filter
+
 from .._kernel import Array
 from .series import Data, Series
 from .system import Simulated, Structure, simulate
@@ -70,22 +72,43 @@ def iv(data: Data, structure: Structure, v: Array) -> Array:
 
 
 def iv_equations(run: Series, structure: Structure, v: Array) -> Equations | None:
-    """The instrumental equations of a run; None where 1/A is unstable."""
+    """The instrumental equations of a run, prefiltered by 1/A (unstable poles reflected); None where B/A runs away."""
     from scipy.signal import lfilter
 
-    filter = structure.filter(v)
-    if not filter.stable:
-        return None
     out = simulate(run, structure, v)
     if not out.ok:
         return None
     y = np.where(run.has, run.y, out.force)  # a gap is filled by the simulation: it carries no error
-    y, u, x = (np.asarray(lfilter([1.0], filter.a, signal)) for signal in (y, out.elastic, out.force))
+    A = _stable(structure.filter(v))
+    y, u, x = (np.asarray(lfilter([1.0], A, signal)) for signal in (y, out.elastic, out.force))
     r = structure.order
     target = _power(y, r, 0) - _power(u, r, 0)
     regressors = np.concatenate([-_basis(y, r), _basis(u, r)], axis=1)
     instruments = np.concatenate([-_basis(x, r), _basis(u, r)], axis=1)
     return Equations(target, regressors, instruments, (run.weight > 0) & ~out.let_go)
+
+
+def output_error(data: Data, structure: Structure, v: Array) -> Array:
+    """(α, β) by a Gauss-Newton step on the simulated output error, γ held."""
+    r2, g = 2 * structure.order, structure.nonlinear
+    matrix, right = np.zeros((r2, r2)), np.zeros(r2)
+    for run in data.runs:
+        out = simulate(run, structure, v, "all")
+        J = out.jacobian[:, g:]
+        matrix += J.T @ (J * run.weight[:, None])
+        right += J.T @ (run.weight * (run.y - out.force))
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    step = np.linalg.lstsq(matrix / np.outer(scale, scale), right / scale, rcond=1e-14)[0] / scale
+    return np.asarray(v[g:] + step)
+
+
+def _stable(filter: Filter) -> Array:
+    """A with the poles outside the unit circle reflected into it."""
+    p = filter.poles
+    if filter.stable:
+        return np.array(filter.a)
+    inside = np.where(np.abs(p) > 1, 1 / np.conj(p), p)
+    return np.real(np.poly(0.99999 * inside))
 
 
 def _rows(run: Series, order: int) -> NDArray[np.bool_]:

@@ -63,8 +63,8 @@ def _rested(t: Array, x: Array, i: int, loaded_s: float, touch_mm: float) -> boo
 
 def _marked(m: Measurement) -> list[tuple[float, float]]:
     """The stretches that the marks call ramps."""
-    ends = [mark.time_s for mark in m.marks[1:]] + [float(m.position_time_s[-1])]
-    return [(mark.time_s, end) for mark, end in zip(m.marks, ends, strict=True)
+    ends = [mark.time_s for mark in m.marks] + [float(m.position_time_s[-1])]
+    return [(mark.time_s, end) for mark, end in zip(m.marks, ends[1:], strict=True)
             if mark.kind == "ramp" and mark.phase in ("precondition", "steps") and end > mark.time_s]  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from .._kernel import Array
 from ..laws import Family
 
 FEWEST = 20  # grid samples that can be fitted
+KEPT = 4  # elastic responses remembered a run: searches over the filter ask for the same again and again
 
 
 @dataclass(frozen=True)
@@ -41,9 +42,18 @@ class Series:
     owner: NDArray[np.intp]
     count: Array
     depth_mm: Array
+    _kept: dict[tuple[str, bytes], tuple[Array, Array]] = field(default_factory=dict, compare=False, repr=False)
 
     def elastic(self, family: Family, theta: Array) -> tuple[Array, Array]:
-        """Elastic response over its value at D, averaged: s (K,), ds/dθ (K, k)."""
+        """Elastic response over its value at D, averaged: s (K,), ds/dθ (K, k). The last few are kept."""
+        key = (f"{family.name} {family.degree}", theta.tobytes())
+        if key not in self._kept:
+            if len(self._kept) >= KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = self._averaged(family, theta)
+        return self._kept[key]
+
+    def _averaged(self, family: Family, theta: Array) -> tuple[Array, Array]:
         s, ds = family.shape(self.u, theta)
         if len(s) == len(self.count):
             return s, np.ascontiguousarray(ds)
