@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from sim import axis_kernel
 from sim.axis import BenchPlant
 from sim.clock import Event, SimClock
 from sim.noise import GaussianNoise
@@ -76,7 +75,7 @@ class Drive:
             self._tick = None
         if self._pushing:
             self._pushing = False
-            self._ceiling(self.force_limit_N)
+            self.plant.limit_force(self.force_limit_N)
 
     def hold(self, position_mm: float) -> None:
         """Servo on, set-point now (motor frame)."""
@@ -111,7 +110,7 @@ class Drive:
     def push_with(self, force_N: float) -> None:
         """Limit the force of the motion under way, until the next command."""
         self._pushing = True
-        self._ceiling(min(force_N, self.force_limit_N))
+        self.plant.limit_force(min(force_N, self.force_limit_N))
 
     def damp(self, at_s: float, damping_N_s_mm: float) -> None:
         """Resist motion only. Light damping comes out as half of what the servo's own would be."""
@@ -147,8 +146,4 @@ class Drive:
         """Limit what the motor can push, as a device's own clamp does; never above what the drive can."""
         self.force_limit_N = min(force_N, self.plant.settings.max_force_N)
         if not self._pushing:
-            self._ceiling(self.force_limit_N)
-
-    def _ceiling(self, force_N: float) -> None:
-        # BenchPlant has no call for it: its settings array is what its loop reads.
-        self.plant._s[axis_kernel.MAX_FORCE] = force_N
+            self.plant.limit_force(self.force_limit_N)

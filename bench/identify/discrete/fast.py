@@ -32,7 +32,7 @@ from ..result import FitResult
 from ..solver import Solution, minimise
 from . import outcome
 from .estimator import Found, arx_scores, output_error_scores, relative_V, silent
-from .iterative import refined
+from .iv import refined
 from .linear import arx
 from .phases import Ramp, ramps_of
 from .series import Data
@@ -120,7 +120,8 @@ class Fast:
         return linear
 
     def _notes(self, figures: dict[str, float], ramps: int, samples: int) -> list[str]:
-        which = "all rising ramps" if self.ramps == "all" else "rising ramps from a recovered pad"
+        which = "rising ramp" if self.ramps == "all" else "rising ramp from a recovered pad"
+        which = which.replace("ramp", "ramps", 1) if ramps > 1 else which
         lines = [
             f"The elastic law is from {samples} samples of {ramps} {which}; {100 * figures['loss_in_ramp']:.2g} % of "
             "the force relaxes within them, and the law is that much too soft."
@@ -174,11 +175,11 @@ def _static(structure: Structure, phase: _Phase) -> tuple[Solution, float]:
 
 
 def _instrumental(data: Data, structure: Structure, v: Array) -> Array:
-    """The instrumental variable's filter for the γ in v, by repeated steps."""
+    """v with the instrumental variable's filter for the law's shape in it, by repeated steps."""
     for _ in range(MOST_STEPS):
-        linear = refined(data, structure, v)
-        still = np.linalg.norm(linear - v[structure.nonlinear :]) <= 1e-9 * np.linalg.norm(linear)
-        v = structure.joined(v[: structure.nonlinear], linear)
+        new = refined(data, structure, v)
+        still = bool(np.all(np.abs(new - v) <= 1e-9 * np.max(np.abs(v))))
+        v = new
         if still:
             break
     return v

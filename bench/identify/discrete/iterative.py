@@ -1,11 +1,11 @@
-"""The paper's iterative method, and the same with an instrumental-variable step (`iv`).
+"""The paper's iterative method.
 
 In turn, until the numbers stand still: γ by (16) with A and B held; then A and B by linear least squares with
 u = F^e(δ; γ), as an ARX system with b_0 = 1 held: F(k) − u(k) is regressed on F(k−i) and u(k−i), so the gain stays with
 γ and no rescaling is needed. It starts from A = B = 1 (a_i = b_i = 0), as the paper does for its fast form.
 
 The turns are a fixed-point iteration on two different criteria; V need not fall, and the fixed point is no minimum of V.
-With `iv` in place of ARX it is one (see `linear`).
+With the instrumental variable in place of ARX it is one (see `iv`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from .._kernel import Array
 from ..noise import noise_of
 from ..result import FitResult
 from . import outcome
-from .estimator import Found, arx_scores, output_error_scores, relative_V, silent
-from .linear import arx, iv
+from .estimator import Found, arx_scores, relative_V, silent
+from .linear import arx
 from .search import first_gamma, gamma_step
 from .series import Data
 from .system import Structure, simulate
@@ -49,7 +49,6 @@ class Iterative:
     """The scheme, for `outcome.fit`."""
 
     name = "iterative"
-    instrumental = False
 
     def estimate(self, data: Data, structure: Structure, quick: bool = False, start: Array | None = None) -> Found:
         """The fixed point of the turns; where the filter of a turn runs away, the best turn before it."""
@@ -62,8 +61,8 @@ class Iterative:
             noise = noise_of(data.on_grid()).force_N / data.force_N
             left = silent(data, structure, noise)
         before, history, converged = _force(data, structure, v), [], False
-        for turn in range(TURNS // 4 if quick else TURNS):
-            linear = self._linear(data, structure, v, left, first=turn == 0 and start is None)
+        for _ in range(TURNS // 4 if quick else TURNS):
+            linear = arx(data, structure, v, left)
             next_v = gamma_step(data, structure, structure.joined(v[: structure.nonlinear], linear))
             if next_v is None:
                 break
@@ -87,34 +86,6 @@ class Iterative:
     def scores(self, data: Data, structure: Structure, v: Array) -> list[Array]:
         """Those of the two steps."""
         return arx_scores(data, structure, v)
-
-    def _linear(self, data: Data, structure: Structure, v: Array, left: list[np.ndarray] | None, first: bool) -> Array:
-        return arx(data, structure, v, left)
-
-
-class Instrumental(Iterative):
-    """The turns with the refined instrumental variable; the first is ARX, which gives it a filter to begin with."""
-
-    name = "iv"
-
-    def scores(self, data: Data, structure: Structure, v: Array) -> list[Array]:
-        """Those of the output error, whose stationary point it is."""
-        return output_error_scores(data, structure, v)
-
-    def _linear(self, data: Data, structure: Structure, v: Array, left: list[np.ndarray] | None, first: bool) -> Array:
-        return arx(data, structure, v, left) if first else refined(data, structure, v)
-
-
-def refined(data: Data, structure: Structure, v: Array) -> Array:
-    """An instrumental-variable step, shortened while it would make the filter run away or V much worse."""
-    g = structure.nonlinear
-    old, new = v[g:], iv(data, structure, v)
-    V = relative_V(data, structure, v)
-    for share in (1.0, 0.5, 0.25, 0.1, 0.02):
-        tried = old + share * (new - old)
-        if relative_V(data, structure, structure.joined(v[:g], tried)) <= 2 * V:
-            return tried
-    return old
 
 
 def _force(data: Data, structure: Structure, v: Array) -> Array:

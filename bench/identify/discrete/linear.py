@@ -57,18 +57,26 @@ def arx_equations(
 
 
 def iv(data: Data, structure: Structure, v: Array) -> Array:
-    """(α, β) by one step of the refined instrumental variable from the filter in v; v itself where that is no help."""
-    r2 = 2 * structure.order
-    matrix, right = np.zeros((r2, r2)), np.zeros(r2)
+    """v after one step of the refined instrumental variable from the filter in it; v itself where that is no help.
+
+    Here b_0 is free, and goes into the gain afterwards (B/b_0, gain·b_0): the gain and the filter pull on the same thing,
+    and turns that hold one of them creep.
+    """
+    size = 2 * structure.order + 1
+    matrix, right = np.zeros((size, size)), np.zeros(size)
     for run in data.runs:
         e = iv_equations(run, structure, v)
         if e is None:
-            return v[structure.nonlinear :].copy()
+            return v
         Z = e.instruments[e.rows]
         matrix += Z.T @ e.regressors[e.rows]
         right += Z.T @ e.target[e.rows]
-    scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), 1e-300))
-    return np.asarray(np.linalg.lstsq(matrix / np.outer(scale, scale), right / scale, rcond=1e-14)[0] / scale)
+    found = _scaled_solve(matrix, right)
+    b_0 = float(found[0])
+    if not 0.1 < b_0 < 10:
+        return v
+    r, g = structure.order, structure.nonlinear
+    return np.concatenate([[v[0] * b_0], v[1:g], found[1 : 1 + r], found[1 + r :] / b_0])
 
 
 def iv_equations(run: Series, structure: Structure, v: Array) -> Equations | None:
@@ -82,24 +90,24 @@ def iv_equations(run: Series, structure: Structure, v: Array) -> Equations | Non
     A = _stable(structure.filter(v))
     y, u, x = (np.asarray(lfilter([1.0], A, signal)) for signal in (y, out.elastic, out.force))
     r = structure.order
-    target = _power(y, r, 0) - _power(u, r, 0)
-    regressors = np.concatenate([-_basis(y, r), _basis(u, r)], axis=1)
-    instruments = np.concatenate([-_basis(x, r), _basis(u, r)], axis=1)
-    return Equations(target, regressors, instruments, (run.weight > 0) & ~out.let_go)
+    by_u = [_power(u, r, 0)[:, None], _basis(u, r)]
+    regressors = np.concatenate([by_u[0], -_basis(y, r), by_u[1]], axis=1)
+    instruments = np.concatenate([by_u[0], -_basis(x, r), by_u[1]], axis=1)
+    return Equations(_power(y, r, 0), regressors, instruments, (run.weight > 0) & ~out.let_go)
 
 
 def output_error(data: Data, structure: Structure, v: Array) -> Array:
-    """(α, β) by a Gauss-Newton step on the simulated output error, γ held."""
-    r2, g = 2 * structure.order, structure.nonlinear
-    matrix, right = np.zeros((r2, r2)), np.zeros(r2)
+    """v after one Gauss-Newton step on the simulated output error by gain, A and B, the law's shape held."""
+    free = np.r_[0, structure.nonlinear : structure.size]
+    matrix, right = np.zeros((len(free), len(free))), np.zeros(len(free))
     for run in data.runs:
         out = simulate(run, structure, v, "all")
-        J = out.jacobian[:, g:]
+        J = out.jacobian[:, free]
         matrix += J.T @ (J * run.weight[:, None])
         right += J.T @ (run.weight * (run.y - out.force))
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    step = np.linalg.lstsq(matrix / np.outer(scale, scale), right / scale, rcond=1e-14)[0] / scale
-    return np.asarray(v[g:] + step)
+    new = v.copy()
+    new[free] += _scaled_solve(matrix, right)
+    return new
 
 
 def _stable(filter: Filter) -> Array:
@@ -129,6 +137,11 @@ def _power(x: Array, order: int, delay: int) -> Array:
 def _basis(x: Array, r: int) -> Array:
     """Columns (1 − z⁻¹)^j z^(j−r) x, j = 0 … r−1: (K, r)."""
     return np.stack([_power(x, j, r - j) for j in range(r)], axis=1) if r else np.zeros((len(x), 0))
+
+
+def _scaled_solve(matrix: Array, right: Array) -> Array:
+    scale = np.sqrt(np.maximum(np.abs(np.diag(matrix)), 1e-300))
+    return np.asarray(np.linalg.lstsq(matrix / np.outer(scale, scale), right / scale, rcond=1e-14)[0] / scale)
 
 
 def _scaled_lstsq(A: Array, b: Array) -> Array:
