@@ -21,7 +21,7 @@ from bench.run.folder import FIT, MODEL, REPORT
 
 if TYPE_CHECKING:
     from bench.identify import FitResult
-    from bench.plan import Plan
+    from bench.predict import Prediction
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Results:
         return fit_lines(self.fit)
 
 
-def analyse(folder: Path, *, plan: Plan | None = None) -> Results:
+def analyse(folder: Path, *, prediction: Prediction | None = None) -> Results:
     """Fit the recording of a run folder, and write model.yaml, fit.json and report.html beside it.
 
     What cannot be fitted (an air run, a run stopped before the pad) is said in the report. Raises `InputError` where
@@ -56,8 +56,9 @@ def analyse(folder: Path, *, plan: Plan | None = None) -> Results:
         report,
         recording,
         fit_view(fit) if fit is not None else None,
-        plan=_planned(recording, plan),
+        plan=_planned(recording, prediction),
         fit_problem=problem,
+        host=recording.host,
     )
     return Results(folder, fit, problem, report)
 
@@ -92,15 +93,15 @@ def _fit_of(recording: Recording) -> tuple[FitResult | None, str]:
         return None, error.message
 
 
-def _planned(recording: Recording, plan: Plan | None) -> PlannedCurve | None:
-    """The planned motion of the steps, laid where the run began them (pad frame, the recording's clock)."""
-    if plan is None or any(segment.kind.startswith("force") for segment in plan.segments):
+def _planned(recording: Recording, prediction: Prediction | None) -> PlannedCurve | None:
+    """The planned motion of the steps and the force expected, laid where the run began them (the recording's clock).
+
+    Where a force ends a ramp, plan and run part in time, and no curve is drawn.
+    """
+    if prediction is None or any(segment.kind.startswith("force") for segment in prediction.segments):
         return None
     begin = next((mark.time_s for mark in recording.steps if mark.phase in ("precondition", "steps")), None)
     if begin is None:
         return None
-    from bench.predict import predict
-
-    prediction = predict(plan, None)
-    offset = np.asarray(prediction.time_s) + begin
-    return PlannedCurve(offset, prediction.position_mm, None)
+    expected = None if np.isnan(prediction.force_N).all() else prediction.force_N
+    return PlannedCurve(prediction.time_s + begin, prediction.position_mm, expected)

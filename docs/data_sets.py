@@ -7,10 +7,8 @@ the fit is the default one for all.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-
-import numpy as np
 
 from bench.identify.prepare import baseline_removed, contact_of, indentation, surface_at
 from bench.recording.csv_file import read_csv
@@ -27,7 +25,6 @@ class DataSet:
     read: Callable[[Path], Measurement]
     unit: str = "N"
     scale: float = 1.0
-    files: tuple[str, ...] = field(default=())
 
 
 def plain(path: Path) -> Measurement:
@@ -38,25 +35,6 @@ def plain(path: Path) -> Measurement:
 def strain_and_stress(path: Path) -> Measurement:
     """Strain as mm, stress as N: a specimen of 1 mm and 1 m²."""
     return read_csv(path, columns={"position": "strain", "force": "stress_Pa"}).measurement()
-
-
-def own_stamps(path: Path) -> Measurement:
-    """Position at its own stamps (time_pos_s, position_raw_mm); drop-outs to 0 left out."""
-    recording = read_csv(path)
-    force = recording.measurement()
-    time, position = recording.extra["time_pos_s"], recording.extra["position_raw_mm"]
-    repaired = recording.motor.position_mm
-    good = np.isfinite(time) & np.isfinite(position) & (np.abs(position - repaired) < 0.5 * np.ptp(repaired))
-    time, first = np.unique(time[good], return_index=True)
-    position = position[good][first]
-    inside = (force.force_time_s >= time[0]) & (force.force_time_s <= time[-1])
-    return replace(
-        force,
-        position_time_s=time,
-        position_mm=position,
-        force_time_s=force.force_time_s[inside],
-        force_N=force.force_N[inside],
-    )
 
 
 def without_first(path: Path) -> Measurement:
@@ -94,9 +72,8 @@ SETS = (
     DataSet(
         "silicone_stretcher",
         "Silicone strips in tension, steps, cycles, sawtooth",
-        "Force at `time_s`; position as logged (`position_raw_mm`) at its own stamps (`time_pos_s`), drop-outs to 0 left"
-        " out.",
-        own_stamps,
+        AS_IT_IS,
+        plain,
         "mN",
         1e3,
     ),

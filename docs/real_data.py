@@ -8,6 +8,7 @@ Writes DIR/real_data.md and DIR/img/real_*.png (DIR: docs). The files are read f
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,9 +17,9 @@ import numpy as np
 
 from bench.errors import PadbenchError
 from bench.identify import FitResult, fit
-from bench.identify.remainder import sentence
+from bench.identify.remainder import gist, is_foreign
 
-from .data_sets import LEFT_OUT, SETS, DataSet
+from docs.data_sets import LEFT_OUT, SETS, DataSet
 
 COLUMNS = 3  # panels of a picture's row: force in time, residual in time, force over depth
 POINTS = 1500  # of a curve in a picture
@@ -69,19 +70,36 @@ def table(data: DataSet, rows: list[Row]) -> list[str]:
         )
     if any(row.result and row.result.noise and not row.result.noise.from_holds for row in rows):
         out += ["", "\\* no hold in the file: noise from local parabolas through the motion."]
-    out += ["", "What is plainly not explained:", ""]
+    out += ["", "What is plainly not explained (share of the error's power beyond the noise):", ""]
+    return out + left_of(rows)
+
+
+def left_of(rows: list[Row]) -> list[str]:
+    """One line a pattern, with the files that show it."""
+    groups: dict[str, list[str]] = {}
     for row in rows:
-        said = sentence(row.result) if row.result else row.refusal
-        notes = [n for n in (row.result.notes if row.result else []) if _worth_telling(n)]
-        out.append(f"- `{row.name}`: {' '.join([said, *notes])}")
-    return out
+        f = row.result
+        if f is None:
+            groups.setdefault(f"no fit: {row.refusal}", []).append(f"`{row.name}`")
+            continue
+        for line in gist(f, most=1 if len(rows) > 10 else 2).split("; ") or []:
+            share, _, what = line.partition(" % ")
+            if not line:
+                groups.setdefault("nothing: the error is that of the noise", []).append(f"`{row.name}`")
+            elif share.isdigit():
+                of = "the model does not describe the data; of the force's variation, " if is_foreign(f) else ""
+                groups.setdefault(of + re.sub(r" \(\d+ % of the samples\)", "", what), []).append(
+                    f"`{row.name}` {share} %"
+                )
+            else:
+                groups.setdefault(line, []).append(f"`{row.name}`")
+        for note in f.notes:
+            if note.startswith(("The force", "The data begin", "The slowest", "In air")) and not is_foreign(f):
+                groups.setdefault(NUMBER.sub("…", note).rstrip("."), []).append(f"`{row.name}`")
+    return [f"- {what[0].upper()}{what[1:]}: {', '.join(files)}." for what, files in groups.items()]
 
 
-def _worth_telling(note: str) -> bool:
-    """Notes that bear on what is not explained; ranges and reading steps stand elsewhere."""
-    return note.startswith(
-        ("The force", "The data begin", "The slowest", "In air", "No positive", "force:", "position:")
-    )
+NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 
 def picture(data: DataSet, rows: list[Row], path: Path) -> None:
@@ -127,8 +145,8 @@ def picture(data: DataSet, rows: list[Row], path: Path) -> None:
 
 HEAD = """# Measured data
 
-The default fit (`padbench fit FILE`: law, order and contact chosen from the data) of every force-displacement file of the
-project's collection of measured data. Made by
+The default fit (`padbench fit FILE`: law, order and contact chosen from the data) of every force-displacement file of
+the project's collection of measured data. Made by
 
     python -m docs.real_data DATA_DIR
 
@@ -136,10 +154,10 @@ which reads the files where they are; they belong to others and are not part of 
 the `PROVENANCE.md` beside it.
 
 How to read the tables: *error* is the RMS of the simulated force against the measured one, over the whole file, from
-measured motion alone. *Noise of its holds* is what such an error would be with nothing left to explain: the scatter about
-smooth curves through the holds, with the position's noise carried through the stiffness. *Held-out error* is the same RMS
-for time blocks that the fit did not see. *Not told*: parameters whose standard error exceeds half of their value, or
-that ended at the edge of what the data can show. In the pictures measured is grey, simulated red.
+measured motion alone. *Noise of its holds* is what such an error would be with nothing left to explain: the scatter
+about smooth curves through the holds, with the position's noise carried through the stiffness. *Held-out error* is the
+same RMS for time blocks that the fit did not see. *Not told*: parameters whose standard error exceeds half of their
+value, or that ended at the edge of what the data can show. In the pictures measured is grey, simulated red.
 
 The model is one elastic response and one linear relaxation, from rest. On measured pads its error is a few times the
 noise, seldom one: what is left is said below each table, from simple regressions of the residual on motion, depth and

@@ -13,7 +13,7 @@ from bench.errors import EXIT_DONE, EXIT_NO, InputError, Refused
 
 if TYPE_CHECKING:
     from bench.config import Bench
-    from bench.plan import Plan
+    from bench.predict import Prediction
     from bench.preflight import Preflight
     from bench.run.runner import Outcome
 
@@ -27,6 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--attended", action="store_true", help="somebody stands at the bench, a hand at its stop")
     parser.add_argument("--sample", metavar="ID", help="what is pressed; goes into the recording")
     parser.add_argument("--operator", metavar="NAME", help="who presses it")
+    parser.add_argument("--conditions", metavar="TEXT", help="temperature, humidity … of the day")
     parser.add_argument("--note", metavar="TEXT", help="anything worth remembering")
 
 
@@ -65,22 +66,22 @@ def main(args: argparse.Namespace) -> int:
             preflight.plan,
             folder,
             believed_text=find_file("pad", args.pad).read_text("utf-8") if args.pad else None,
-            notes=Notes(args.sample, args.operator, args.note),
+            notes=Notes(args.sample, args.operator, args.note, args.conditions),
             progress=progress.tell,
         )
     _say_outcome(outcome, bench, time.perf_counter() - started)
-    _after(outcome, preflight.plan)
+    _after(outcome, preflight.prediction)
     return EXIT_DONE if outcome.cause is None else EXIT_NO
 
 
-def _after(outcome: Outcome, plan: Plan) -> None:
+def _after(outcome: Outcome, prediction: Prediction) -> None:
     from rich.console import Console
 
     from bench.results import analyse
 
     console = Console()
     with console.status("fitting the pad's model"):
-        results = analyse(outcome.folder, plan=plan)
+        results = analyse(outcome.folder, prediction=prediction)
     for line in results.lines():
         console.print(line, highlight=False, markup=False)
     console.print(f"report: {results.report}", highlight=False, markup=False, soft_wrap=True)

@@ -62,7 +62,7 @@ def _about(m: Measurement, noise: Noise, unilateral: bool) -> list[str]:
 
 def _first_level(force: Array, depth: Array) -> float:
     """Mean force before the motion begins, over at most 20 samples."""
-    still = np.abs(depth[:20] - depth[0]) <= 0.005 * np.ptp(depth)
+    still = np.abs(depth[:20] - depth[0]) <= 0.0005 * np.ptp(depth)
     count = len(still) if still.all() else int(np.argmin(still))
     return float(np.mean(force[: max(count, 1)]))
 

@@ -52,18 +52,18 @@ def indentation(m: Measurement, stiffness_N_mm: float) -> Measurement:
 def contact_of(m: Measurement) -> float:
     """Position at which the force first leaves its early level for good on the way in, mm.
 
-    The level and its scatter are those of the first tenth of the way in; contact is where the force last crosses
-    five scatters above before it reaches a tenth of its greatest rise. Raises InputError where it never rises.
+    The level and its scatter are those of the first sixth of the way in; contact is where the force last crosses five
+    scatters above it before it reaches a tenth of its greatest rise. Raises InputError where it never rises.
     """
     depth = _at_force(m)
-    deepest = int(np.argmax(depth)) or len(depth) - 1
+    deepest = int(np.argmax(depth >= depth[0] + 0.98 * (depth.max() - depth[0])))
+    if deepest < 60:
+        raise InputError(m.name, "there is no way in to find a surface on")
     force = m.force_N[: deepest + 1]
-    early = max(deepest // 10, 10)
-    t = np.linspace(-1, 1, early)
-    slope, level = np.polyfit(t, force[:early], 1)
-    base = level + slope * (np.arange(len(force)) / max(early - 1, 1) * 2 - 1)
-    scatter = float(np.std(force[:early] - base[:early]))
-    rise = force - base
+    early = max(int(np.argmax(depth >= depth[0] + (depth.max() - depth[0]) / 6)), 10)
+    line = np.polyfit(depth[:early], force[:early], 1)
+    rise = force - np.polyval(line, depth[: deepest + 1])
+    scatter = float(np.std(rise[:early]))
     if float(rise.max()) < 8 * scatter:
         raise InputError(m.name, "the force never rises above its early scatter: there is no contact in these data")
     up = int(np.argmax(rise > max(0.1 * rise.max(), 5 * scatter)))

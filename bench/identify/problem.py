@@ -69,14 +69,15 @@ class Problem:
         return replace(self, runs=tuple(replace(r, weight=w) for r, w in zip(self.runs, weights, strict=True)))
 
     def times(self) -> tuple[float, float]:
-        """Shortest useful and longest time in the data, s: the median force step, and the longest run's span."""
+        """Shortest useful and longest time in the data, s: the force step that a tenth of the steps fall below (where
+        stamps are dense after a move and sparse later, the dense ones), and the longest run's span."""
         steps, spans = [], []
         for run in self.runs:
             t = run.time_s[run.weight > 0]
             if len(t) > 1:
                 steps.append(np.diff(t))
                 spans.append(t[-1] - t[0])
-        return float(np.median(np.concatenate(steps))), float(max(spans))
+        return float(np.quantile(np.concatenate(steps), 0.1)), float(max(spans))
 
 
 def build(measurements: Sequence[Measurement]) -> Problem:

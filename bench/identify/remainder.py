@@ -62,19 +62,24 @@ def is_foreign(result: FitResult) -> bool:
 
 
 def sentence(result: FitResult) -> str:
-    """One or two plain sentences on what is left."""
+    """One or two plain sentences on what is left, and how much it is."""
+    if not patterns(result):
+        ratio = result.rmse / result.noise_floor if result.noise_floor > 0 else np.inf
+        return f"Nothing plain: the error is {ratio:.2g} times the noise."
+    told = gist(result)
+    if is_foreign(result):
+        return "The model does not describe these data. Of the force's variation, " + told + "."
     ratio = result.rmse / result.noise_floor if result.noise_floor > 0 else np.inf
+    return f"The error is {ratio:.2g} times the noise. Of that, {told}."
+
+
+def gist(result: FitResult, most: int = 2) -> str:
+    """The strongest patterns, or else where the residual is large; empty where nothing is left."""
     found = patterns(result)
     if not found:
-        return f"Nothing plain: the error is {ratio:.2g} times the noise."
-    told = [p for p in found if p.share >= TELLING][:2]
-    if is_foreign(result):
-        start, what = "The model does not describe these data. ", "of the force's variation"
-    else:
-        start, what = f"The error is {ratio:.2g} times the noise. ", "of it"
-    if not told:
-        return start + _where(result)
-    return start + "; ".join(f"{100 * p.share:.0f} % {what} {p.sentence}" for p in told) + "."
+        return ""
+    told = [p for p in found if p.share >= TELLING][:most]
+    return "; ".join(f"{100 * p.share:.0f} % {p.sentence}" for p in told) or _where(result)
 
 
 def _where(result: FitResult) -> str:
@@ -97,18 +102,18 @@ def _where(result: FitResult) -> str:
     for name, line in PLACES.items():
         share, part = power[name] / total, samples[name] / count
         if share >= 0.6 and share > 1.3 * part:
-            return f"{100 * share:.0f} % of it {line.format(part=100 * part)}"
-    return "It follows no simple pattern of motion, depth or time, and is everywhere."
+            return f"{100 * share:.0f} % {line.format(part=100 * part)}"
+    return "nothing follows a simple pattern of motion, depth or time"
 
 
 CORNER = 5  # samples on either side of where a move begins or ends
 
 PLACES = {
     "corners": "stands where moves begin and end ({part:.0f} % of the samples): stamps of position and force that do"
-    " not agree, or corners between samples.",
-    "moves": "lies in the moves ({part:.0f} % of the samples) and follows no simple pattern there: shaking of the drive,"
-    " or a reported position that is not the true one.",
-    "holds": "lies in the holds ({part:.0f} % of the samples) and follows no simple pattern there.",
+    " not agree, or corners between samples",
+    "moves": "lies in the moves ({part:.0f} % of the samples) and follows no simple pattern there: shaking of the"
+    " drive, or a reported position that is not the true one",
+    "holds": "lies in the holds ({part:.0f} % of the samples) and follows no simple pattern there",
 }
 
 SENTENCES = {

@@ -21,6 +21,7 @@ from bench.recording.scan import Scan
 from bench.recording.schemas import (
     EVENT,
     EXTRA,
+    HOST,
     LIBRARY,
     LOAD_CELL,
     MOTOR,
@@ -197,6 +198,7 @@ class _Reading:
             steps=self._steps(),
             run=run,
             result=self.metadata.get(RESULT),
+            host=self.metadata.get(HOST, {}),
             attachments=self.attachments,
             lost=self._lost(scan),
         )

@@ -68,12 +68,13 @@ def measurement_of(recording: Recording) -> Measurement:
     force_time, force = _forces(recording, delays, notes)
     if position.size < 2:
         raise InputError(place, "holds fewer than two position samples", cure)
+    fit_from, fit_to = _span(recording, place)
     inside = (force_time >= position_time[0]) & (force_time <= position_time[-1])
-    outside = int(force_time.size - inside.sum())
+    # A cell that is read before the motor answers is how every run begins: not worth a word.
+    outside = int(np.count_nonzero(~inside & (force_time >= fit_from)))
     if outside:
         notes.append(f"{outside} force samples outside the time of the position samples left out")
     force_time, force = force_time[inside], force[inside]
-    fit_from, fit_to = _span(recording, place)
     counted = int(np.count_nonzero((force_time >= fit_from) & (force_time <= fit_to)))
     if counted < 2:
         raise InputError(place, f"holds {counted} force samples that count, two at the least are needed", cure)

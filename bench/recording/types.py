@@ -86,6 +86,8 @@ class Recording:
     surface_std_mm: float = 0.0
     run: dict[str, str] = field(default_factory=dict)
     result: dict[str, str] | None = None
+    host: dict[str, str] = field(default_factory=dict)
+    """The `padbench.host` record: wall-clock start and versions, what may differ between two runs of one seed."""
     attachments: dict[str, bytes] = field(default_factory=dict)
     extra: dict[str, Array] = field(default_factory=dict)
     """Further columns of a CSV file, shape (k,) each, at `extra_time_s`; NaN where a cell is empty."""

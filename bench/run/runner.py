@@ -43,6 +43,7 @@ class Notes:
     sample: str | None = None
     operator: str | None = None
     note: str | None = None
+    conditions: str | None = None
 
 
 @dataclass(frozen=True)
@@ -182,6 +183,7 @@ def _run_record(protocol: Protocol, bench: Bench, notes: Notes) -> dict[str, obj
         "sample": sample,
         "operator": notes.operator or "",
         "note": notes.note or "",
+        "conditions": notes.conditions or "",
         "probe": bench.machine.probe.model_dump(exclude_none=True),
         "motor": bench.motor.driver,
         "load_cell": bench.load_cell.driver,

@@ -1,6 +1,6 @@
 """The iterative scheme with an instrumental variable in place of ARX: consistent under output noise.
 
-In turn: A, B and the gain by the refined instrumental variable (see `linear`), γ by (16). It begins with a turn of ARX. Each step
+In turn: A, B and the gain by the refined instrumental variable (see `linear`), γ by (16). Each step
 is shortened until V falls; where the instrumental variable finds no such step (far from the truth, or where the pad has
 let go and its surface hangs on A and B, which the instruments do not know), a Gauss-Newton step on the output error
 takes its place. Both stand still at the same point, a stationary point of (16). After each turn the search goes on in
@@ -15,6 +15,7 @@ import numpy as np
 
 from bench.errors import InputError
 from bench.recording.types import Measurement
+from sim.transfer import zero_order_hold
 
 from .._kernel import Array
 from ..noise import noise_of
@@ -99,15 +100,27 @@ def to_gain(data: Data, structure: Structure, v: Array) -> float:
 
 
 def _begin(data: Data, structure: Structure) -> Array:
-    """γ of the elastic response alone, A and B by ARX, γ again."""
-    none = np.zeros(structure.order)
+    """The best, after two steps, of: γ of the elastic response alone with A and B by ARX; and relaxations.
+
+    The instruments need a filter to begin with that is not far off. At a short T noise moves ARX's out of reach, so
+    relaxations with rates spread over the run stand beside it.
+    """
+    r = structure.order
+    none = np.zeros(r)
     v = first_gamma(data, structure, none, none)
     if v is None:
         raise InputError("fit", "the elastic response alone cannot be fitted to these data")
     noise = noise_of(data.on_grid()).force_N / data.force_N
     linear = arx(data, structure, v, silent(data, structure, noise))
-    tried = first_gamma(data, structure, *structure.coefficients(structure.joined(v[: structure.nonlinear], linear)))
-    return v if tried is None else tried
+    filters = [structure.coefficients(structure.joined(v[: structure.nonlinear], linear))]
+    span = max(float(run.time_s[-1] - run.time_s[0]) for run in data.runs)
+    for fastest in (100.0 / span, 0.2 / data.T):
+        edges = np.linspace(np.log(fastest), np.log(min(3.0 / span, 0.1 * fastest)), r + 2)[1:-1]
+        filter = zero_order_hold([0.5 / r] * r, np.exp(edges).tolist(), data.T)
+        filters.append((np.array(filter.a[1:]), np.array(filter.b[1:])))
+    tried = [first_gamma(data, structure, a, b) for a, b in filters]
+    ends = [refined(data, structure, refined(data, structure, w)) for w in tried if w is not None]
+    return min([v, *ends], key=lambda w: relative_V(data, structure, w))
 
 
 def _further(data: Data, structure: Structure, old: Array, new: Array) -> Array:
