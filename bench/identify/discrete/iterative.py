@@ -29,7 +29,9 @@ from .system import Structure, simulate
 
 TURNS = 200
 STILL = 1e-7
-"""Converged: the simulated force moved by less than this share of its own size in a turn."""
+"""Converged: the simulated force moved by less than this share of its own size in a turn …"""
+QUICK = 1e-5
+"""… or than this one, where structures are only compared."""
 
 
 def fit(
@@ -61,7 +63,7 @@ class Iterative:
             noise = noise_of(data.on_grid()).force_N / data.force_N
             left = silent(data, structure, noise)
         before, history, converged = _force(data, structure, v), [], False
-        for _ in range(TURNS // 4 if quick else TURNS):
+        for _ in range(TURNS):
             linear = arx(data, structure, v, left)
             next_v = gamma_step(data, structure, structure.joined(v[: structure.nonlinear], linear))
             if next_v is None:
@@ -71,7 +73,7 @@ class Iterative:
             now = _force(data, structure, v)
             moved = float(np.linalg.norm(now - before)) / max(float(np.linalg.norm(now)), 1e-300)
             before = now
-            if moved < STILL:
+            if moved < (QUICK if quick else STILL):
                 converged = True
                 break
         if not history:

@@ -181,3 +181,9 @@ def test_the_truth_cannot_be_seen(tmp_path):
         recording.source = path.parent.parent
         seen.append(repr(recording))
     assert seen[0] == seen[1]
+
+
+def test_forces_without_motion_beside_them_are_told():
+    m = recording_of(([0, 1, 2], [0, 1, 2]), ([0.5, 1, 2, 2.5, 3], [1, 2, 3, 4, 5])).measurement()
+    assert m.force_time_s.tolist() == [0.5, 1, 2]
+    assert any("2 force samples outside" in note for note in m.notes)
