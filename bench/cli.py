@@ -6,9 +6,11 @@ import argparse
 import difflib
 import importlib
 import os
+import re
 import sys
 import tempfile
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -36,42 +38,70 @@ Exit status: 0 done; 1 the answer is no, or the run was stopped (data kept); 2 b
 
 
 class Parser(argparse.ArgumentParser):
-    """Says what was meant, where a word is nearly right."""
+    """Says what was meant, where a word is nearly right; an option is written in full."""
+
+    def __init__(self, **given: Any) -> None:
+        super().__init__(**given, allow_abbrev=False)
 
     def error(self, message: str) -> NoReturn:
         """One line and where help is; exit status 2."""
-        if "invalid choice: '" in message:
-            word = message.split("invalid choice: '")[1].split("'")[0]
-            near = difflib.get_close_matches(word, COMMANDS, n=1)
-            message = f"there is no command '{word}'" + (f"; did you mean '{near[0]}'?" if near else "")
+        message = message.removeprefix("argument ")
+        for kind, words in (("int", "whole number"), ("float", "number")):
+            message = re.sub(f"invalid {kind} value: ('.*')", rf"\1 is no {words}", message)
         self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message}\n  see {self.prog} --help\n")
 
+    def unknown(self, words: list[str]) -> NoReturn:
+        """Refuse the words that this command knows nothing of."""
+        word = next((word for word in words if word.startswith("-")), words[0])
+        if not word.startswith("-"):
+            self.error(f"'{word}' is one word too many")
+        option = word.split("=")[0]
+        self.error(f"there is no option {option}{_meant(option, self._option_string_actions)}")
 
-def parser(command: str | None) -> argparse.ArgumentParser:
-    """The parser; only the named command's own arguments are filled in, which keeps `--help` quick."""
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is None or value in action.choices:
+            return
+        known = list(action.choices)
+        if action.dest == "command":
+            raise argparse.ArgumentError(None, f"there is no command '{value}'{_meant(value, known)}")
+        raise argparse.ArgumentError(action, f"'{value}' is none of {', '.join(known)}{_meant(value, known)}")
+
+
+def _meant(word: str, known: Iterable[str]) -> str:
+    near = difflib.get_close_matches(word, list(known), n=1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def parser(command: str | None) -> tuple[Parser, Parser]:
+    """The parser, and that of the command; only its own arguments are filled in, which keeps `--help` quick."""
     top = Parser(prog="padbench", description="Press a probe into something soft, and know what it is.",
                  epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
     top.add_argument("--version", action="store_true", help="print the version")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+    named = top
     for name, text in COMMANDS.items():
         sub = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
         if name == command:
             _module(name).arguments(sub)
-    return top
+            named = sub
+    return top, named
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command; returns the exit status of contracts.md."""
     words = sys.argv[1:] if argv is None else argv
     command = next((word for word in words if not word.startswith("-")), None)
-    args = parser(command).parse_args(words)
+    top, named = parser(command)
+    args, unknown = top.parse_known_args(words)
+    if unknown:
+        named.unknown(unknown)
     if args.version:
         from importlib.metadata import version
 
         print(f"padbench {version('padbench')}")
         return 0
     if args.command is None:
-        parser(None).print_help()
+        top.print_help(sys.stderr)
         return EXIT_BAD_INPUT
     try:
         return int(_module(args.command).main(args))
@@ -84,6 +114,11 @@ def main(argv: list[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_NO
+    except OSError as error:
+        if error.filename is None:
+            return _defect(args.command, error)
+        print(f"padbench {args.command}: {error.filename}: {error.strerror}", file=sys.stderr)
+        return EXIT_BAD_INPUT
     except Exception as error:
         return _defect(args.command, error)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import types
 import typing
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from bench.errors import InputError
 from bench.places import Key, Places, spell
 
 MAX_LISTED = 5
+_NUMBER = re.compile(r"[-+]?[0-9]*\.?[0-9]+([eE][-+]?[0-9]+)?")
 
 
 class FieldError(ValueError):
@@ -61,11 +63,22 @@ def _complaint(details: Any, cls: type[BaseModel], places: Places) -> tuple[tupl
         path = places.known_part(loc) if details["type"] == "missing" else _trimmed(loc, places)
         message = _wording(details)
     unknown = details["type"] == "extra_forbidden"
-    if unknown:
+    if details["type"] in ("union_tag_invalid", "union_tag_not_found") and "discriminator" in details["ctx"]:
+        path, message, cure = _untold(path, details["ctx"])
+    elif unknown:
         cure = nearest(str(loc[-1]), known_keys(cls, loc[:-1]))
     if path:
         message = f"{spell(path)}: {message}"
     return places.position(path, at_key=unknown), places.place(path, at_key=unknown), message, cure
+
+
+def _untold(path: tuple[Key, ...], ctx: Any) -> tuple[tuple[Key, ...], str, str]:
+    """The key that says which of several forms is meant, where it says none of them, or is not there."""
+    key = ctx["discriminator"].strip("'")
+    if "tag" not in ctx:
+        return (*path, key), "is missing", ""
+    known = re.findall(r"'(\w+)'", ctx["expected_tags"])
+    return (*path, key), f"there is no `{ctx['tag']}`", nearest(ctx["tag"], known)
 
 
 def _trimmed(loc: tuple[Key, ...], places: Places) -> tuple[Key, ...]:
@@ -125,7 +138,7 @@ def _shown(value: Any) -> str:
     if isinstance(value, list):
         return f"a list of {len(value)}" if value else "an empty list"
     if isinstance(value, str):
-        return f"the word `{value[:40]}`"
+        return f"the word `{value[:40]}`" + (" (leave out its quotes)" if _NUMBER.fullmatch(value) else "")
     return f"{value}"
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 from bench.config import Bench
 from bench.places import Key
 from bench.protocol import Approach, DepthStep, FlatStep, ForceStep, Protocol
-from bench.rates import force_latency_s, streams
+from bench.rates import force_latency_s, speed_step_mm_s, streams
 from bench.trajectory import Profile, braking_distance
 
 if TYPE_CHECKING:
@@ -160,6 +160,7 @@ class _Planner:
         if protocol.profile == "s_curve":
             jerk = self.acceleration / RISE_TO_ACCELERATION_S
             self.jerk = protocol.jerk or min(jerk, bench.limits.jerk or jerk)
+        self.speed_step_mm_s = speed_step_mm_s(bench)
         self.problems: list[Problem] = []
         self.short: dict[float, list[tuple[str, float]]] = {}
         self.seen: set[tuple[tuple[Key, ...], str]] = set()
@@ -222,10 +223,11 @@ class _Planner:
     def _ramp(self, name: str, phase: Phase, path: tuple[Key, ...], to: float, speed: float) -> Segment:
         start, self.at_mm = self.at_mm, to
         self._check_speed(name, (*path, "speed"), speed)
-        segment = Segment(name, phase, "ramp", path, start, to, NAN, speed, speed, self.acceleration, self.jerk)
+        made = self._made(name, (*path, "speed"), speed)
+        segment = Segment(name, phase, "ramp", path, start, to, NAN, made, speed, self.acceleration, self.jerk)
         if not math.isnan(start) and not math.isnan(to) and start != to:
             reached = segment.profile().peak_speed_mm_s
-            if reached < speed * (1 - 1e-9):
+            if reached < made * (1 - 1e-9):
                 self.short.setdefault(speed, []).append((name, reached))
         return segment
 
@@ -242,16 +244,44 @@ class _Planner:
         allowed = allowed_force_speed(
             step.to_force, stiffness or UNKNOWN_STIFFNESS_N_mm, self.latency_s, self.acceleration, self.noise_N
         )
+        slowest = self.speed_step_mm_s
         if allowed >= step.speed:
-            return step.speed
+            return self._nearest(step.speed)
         pad = f"{stiffness:.3g} N/mm" if known else f"{UNKNOWN_STIFFNESS_N_mm:g} N/mm (taken for want of a model)"
         message = (
             f"approaches {step.to_force:g} N at {allowed:.3g} mm/s, not at the {step.speed:g} mm/s asked for: seen "
             f"{self.latency_s * 1e3:.3g} ms late, a pad of {pad} would be over the target by more than "
             f"{OVERSHOOT_SHARE:.0%}"
         )
+        if allowed < slowest:
+            over_N = (stiffness or UNKNOWN_STIFFNESS_N_mm) * slowest * self.latency_s
+            allowed = slowest
+            message = (
+                f"approaches {step.to_force:g} N at {slowest:g} mm/s, the slowest of this motor: a pad of {pad} may be "
+                f"over the target by {over_N:.2g} N, more than {OVERSHOOT_SHARE:.0%} of it"
+            )
+        elif slowest:
+            allowed = math.floor(allowed / slowest * (1 + 1e-9)) * slowest
         self._once(flat.name, message, (*flat.path, "speed"), severity="notice")
         return allowed
+
+    def _nearest(self, speed: float) -> float:
+        """The speed that the motor makes of one that is asked for: at least its slowest."""
+        step = self.speed_step_mm_s
+        return max(round(speed / step), 1) * step if step else speed
+
+    def _made(self, name: str, path: tuple[Key, ...], speed: float) -> float:
+        """The speed that the motor makes of the one asked for, which is said where it is another."""
+        made = self._nearest(speed)
+        if speed < 0.5 * self.speed_step_mm_s:
+            message = f"speed: {speed:g} mm/s is less than this motor makes: its slowest is {made:g} mm/s"
+            self._once(name, message, path, "move faster, or use a motor that is streamed")
+        elif abs(made - speed) > 1e-3 * speed:
+            message = (
+                f"moves at {made:g} mm/s, not at {speed:g}: this motor counts speeds in {self.speed_step_mm_s:g} mm/s"
+            )
+            self._once(name, message, path, severity="notice")
+        return made
 
     def _check_speed(self, name: str, path: tuple[Key, ...], speed: float) -> None:
         if speed > self.limits.speed_mm_s:

@@ -88,11 +88,11 @@ class Preflight:
             return InputError(self.protocol.place(first.path), str(first), cure)
         return Refused(f"{first}" + (f"\n  {cure}" if cure else ""))
 
-    def lines(self, width: int = 100) -> list[str]:
-        """The summary for a terminal, without colour."""
+    def lines(self, width: int = 100, *, errors: bool = True) -> list[str]:
+        """The summary for a terminal, without colour; without `errors` where these are said otherwise."""
         from bench.preflight_text import render
 
-        return render(self, width)
+        return render(self, width, errors=errors)
 
 
 def check(

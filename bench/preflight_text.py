@@ -21,8 +21,8 @@ REPEAT = re.compile(r"(^precondition(?=\[\d+\]$)|\.[^\[\]]+(?=\[\d+\]\.steps\[))
 """Where a step's name counts repeats."""
 
 
-def render(preflight: Preflight, width: int) -> list[str]:
-    """Lines of text, without colour, at most `width` wide where words allow."""
+def render(preflight: Preflight, width: int, *, errors: bool = True) -> list[str]:
+    """Lines of text, without colour, at most `width` wide where words allow; with what refuses, if `errors`."""
     plan = preflight.plan
     lines = _table(preflight, width)
     most = "at most " if preflight.prediction.bounded else ""
@@ -40,7 +40,7 @@ def render(preflight: Preflight, width: int) -> list[str]:
             lines.append(f"the surface may stand from {low:.3g} to {high:.3g} mm in the motor frame")
     for problem in preflight.notices:
         lines += _said("note", problem)
-    for problem in preflight.errors:
+    for problem in preflight.errors if errors else ():
         lines += _said("refused", problem)
     return lines
 
@@ -85,7 +85,7 @@ def _row(group: list[Outcome]) -> tuple[str, ...]:
         first.name if len(names) == 1 else REPEAT.sub(r"\1[*]", first.name),
         f"{len(names)}",
         to,
-        f"{first.speed_mm_s:.3g}",
+        f"{first.speed_mm_s:.4g}",
         f"{held:g}" if held else "",
         f"{max(peaks):.3g}" if peaks else "",
     )

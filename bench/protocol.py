@@ -98,7 +98,8 @@ def _kind_of_step(value: Any) -> str | None:
     kinds: dict[str, str] = {"to": "depth step", "to_force": "force step", "block": "block of steps"}
     if isinstance(value, _Part):
         return next((tag for key, tag in kinds.items() if hasattr(value, key)), None)
-    return next((tag for key, tag in kinds.items() if key in value), None) if isinstance(value, dict) else None
+    found = [tag for key, tag in kinds.items() if key in value] if isinstance(value, dict) else []
+    return found[0] if len(found) == 1 else None
 
 
 Step = Annotated[

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Literal
 
 from bench.config import Bench
-from drivers.regmap import load_map
+from drivers.regmap import MotorMap, WriteBlock, load_map
 
 STREAM_HZ = 1000.0
 """What a streamed motor is asked for unless the bench file or the protocol says otherwise."""
@@ -22,6 +22,15 @@ _LINE_BITS, _LINE_BAUD, _LINE_HZ = 21 * 10, 115200, 600.0
 def streams(bench: Bench) -> bool:
     """Whether the motor takes a position every tick, rather than making whole moves by itself."""
     return bench.motor.driver == "orca"
+
+
+def speed_step_mm_s(bench: Bench) -> float:
+    """The steps in which the motor counts speeds, the first of which is its slowest; 0 for one that is streamed."""
+    if streams(bench):
+        return 0.0
+    form: MotorMap = load_map(bench.motor.driver, bench.motor.map, "motor")
+    fields = [field for step in form.move if isinstance(step, WriteBlock) for field in step.fields]
+    return max((field.factor for field in fields if field.variable == "speed" and field.type != "f32"), default=0.0)
 
 
 def motor_rate_Hz(bench: Bench, asked_Hz: float | None = None) -> float:

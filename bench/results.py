@@ -76,7 +76,8 @@ def fit_lines(fit: FitResult) -> list[str]:
     for name, parameter in fit.parameters.items():
         doubt = f" ± {parameter.std:.2g}" if math.isfinite(parameter.std) else ""
         verdict = "   undetermined by these data" if name in fit.undetermined else ""
-        lines.append(f"  {name:<{width}} = {parameter.value:.5g}{doubt} {parameter.unit}{verdict}")
+        unit = f" {parameter.unit}" if parameter.unit != "1" else ""
+        lines.append(f"  {name:<{width}} = {parameter.value:.5g}{doubt}{unit}{verdict}")
     lines += [f"  note: {note}" for note in fit.notes]
     return lines
 

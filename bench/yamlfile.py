@@ -211,6 +211,9 @@ def _syntax_error(error: yaml.MarkedYAMLError, path: Path) -> InputError:
         problem, cure = "a second document begins here", "one file holds one document: remove the `---`"
     elif "mapping values are not allowed" in problem:
         cure = "a second `:` in one line: quote the text, or start a new line"
+    elif error.context_mark is not None and error.context and error.context_mark.line != getattr(mark, "line", None):
+        cure = f"it was found {error.context} that begins in line {error.context_mark.line + 1}"
+    problem = problem.replace("'<stream end>'", "the end of the file")
     return InputError(place, f"is not valid YAML: {problem}", cure)
 
 

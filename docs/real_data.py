@@ -18,7 +18,6 @@ import numpy as np
 from bench.errors import PadbenchError
 from bench.identify import FitResult, fit
 from bench.identify.remainder import gist, is_foreign
-
 from docs.data_sets import LEFT_OUT, SETS, DataSet
 
 COLUMNS = 3  # panels of a picture's row: force in time, residual in time, force over depth
@@ -78,28 +77,35 @@ def left_of(rows: list[Row]) -> list[str]:
     """One line a pattern, with the files that show it."""
     groups: dict[str, list[str]] = {}
     for row in rows:
-        f = row.result
-        if f is None:
-            groups.setdefault(f"no fit: {row.refusal}", []).append(f"`{row.name}`")
-            continue
-        for line in gist(f, most=1 if len(rows) > 10 else 2).split("; ") or []:
-            share, _, what = line.partition(" % ")
-            if not line:
-                groups.setdefault("nothing: the error is that of the noise", []).append(f"`{row.name}`")
-            elif share.isdigit():
-                of = "the model does not describe the data; of the force's variation, " if is_foreign(f) else ""
-                groups.setdefault(of + re.sub(r" \(\d+ % of the samples\)", "", what), []).append(
-                    f"`{row.name}` {share} %"
-                )
-            else:
-                groups.setdefault(line, []).append(f"`{row.name}`")
-        for note in f.notes:
-            if note.startswith(("The force", "The data begin", "The slowest", "In air")) and not is_foreign(f):
-                groups.setdefault(NUMBER.sub("…", note).rstrip("."), []).append(f"`{row.name}`")
-    return [f"- {what[0].upper()}{what[1:]}: {', '.join(files)}." for what, files in groups.items()]
+        for what in _said(row, most=1 if len(rows) > 10 else 2):
+            told, _, share = what.partition("|")
+            groups.setdefault(told, []).append(f"`{row.name}`" + (f" ({share} %)" if share else ""))
+    return [f"- {what}: {', '.join(files)}." for what, files in groups.items()]
 
 
-NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
+def _said(row: Row, most: int) -> list[str]:
+    """What there is to say of a file, without its numbers; the share of the error after a bar."""
+    f = row.result
+    if f is None:
+        return [f"No fit, {row.refusal}"]
+    out = []
+    for line in gist(f, most).split("; "):
+        share, _, what = line.partition(" % ")
+        if not line:
+            out.append("Nothing: the error is that of the noise")
+        elif not share.isdigit():
+            out.append("No simple pattern of motion, depth or time")
+        elif is_foreign(f):
+            out.append(f"The model does not describe the data; their force {what}|{share}")
+        else:
+            out.append("The error " + re.sub(r" \(\d+ % of the samples\)", "", what) + f"|{share}")
+    if not is_foreign(f):
+        starts = ("The force", "The data begin", "The slowest", "In air")
+        out += [NUMBER.sub("…", note).rstrip(".") for note in f.notes if note.startswith(starts)]
+    return out
+
+
+NUMBER = re.compile(r"(?<![\d.])[-+]?(?!0 mm)\d[\d.]*(e[-+]?\d+)?")
 
 
 def picture(data: DataSet, rows: list[Row], path: Path) -> None:

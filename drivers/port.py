@@ -42,12 +42,19 @@ def open_port(device: str, url: str, baudrate: int, *, parity: str = "N", stopbi
             parity = "N"
         port = serial.serial_for_url(url, parity=parity, **options)
     except (OSError, ValueError, serial.SerialException) as error:
-        raise PortError(device, f"cannot open port {url!r}: {error}; check 'port' in the bench file") from error
+        message = f"cannot open port {url!r}: {_reason(error)}; check 'port' in the bench file"
+        raise PortError(device, message) from error
     if hasattr(port, "set_low_latency_mode"):
         # USB adapters hold bytes back for up to 16 ms otherwise; ports without the ioctl say so with an error.
         with contextlib.suppress(OSError, ValueError, NotImplementedError):
             port.set_low_latency_mode(True)
     return port
+
+
+def _reason(error: Exception) -> str:
+    """The system's own word for it, where pyserial wraps it in others."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number).lower() if isinstance(number, int) else str(error)
 
 
 def raw_io(port: Port) -> tuple[Callable[[int], bytes], Callable[[bytes], int | None]]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from bench.commands.options import add_bench
-from bench.errors import EXIT_BAD_INPUT, EXIT_DONE
+from bench.commands.options import add_bench, must_be_writable, say_plan
+from bench.errors import EXIT_DONE, InputError
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,26 +24,23 @@ def main(args: argparse.Namespace) -> int:
     if args.list:
         return _list()
     if args.protocol is None:
-        print("padbench check: which protocol? give a file or a shipped name (`padbench check --list`)")
-        return EXIT_BAD_INPUT
+        raise InputError("PROTOCOL", "which one?", "give a file or a shipped name (`padbench check --list`)")
     from bench.config import load_bench, load_model
     from bench.preflight import check
     from bench.protocol import load_protocol
 
+    must_be_writable(args.plot)
     protocol = load_protocol(args.protocol)
     bench = load_bench(args.bench)
     preflight = check(protocol, bench, load_model(args.pad) if args.pad else None)
-    for line in preflight.lines():
-        print(line)
-    if args.plot is not None:
+    if args.plot is not None:  # drawn where it is refused as well: it shows why
         from bench.planview import plan_view
         from bench.report import write_plan
 
         write_plan(args.plot, plan_view(preflight), title=f"Plan of {protocol.name}")
+    say_plan(preflight)
+    if args.plot is not None:
         print(f"plot: {args.plot}")
-    refusal = preflight.refusal()
-    if refusal is not None:
-        raise refusal
     return EXIT_DONE
 
 

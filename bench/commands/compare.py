@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from bench.commands.options import add_columns, add_structure, existing
+from bench.commands.options import add_columns, add_structure, must_be_writable, read_data, status
 from bench.errors import EXIT_DONE, InputError
 
 
@@ -23,25 +23,25 @@ def main(args: argparse.Namespace) -> int:
     """Fit each, print their parameters, write the page."""
     from bench import identify
     from bench.fitview import fit_view
-    from bench.recording import parse_columns, parse_units, read_recording
     from bench.report import write_comparison
     from bench.results import fit_lines
 
     if len(args.runs) < 2:
         raise InputError("RUN", "one run alone compares with nothing", "name two or more")
-    columns = parse_columns(args.columns) if args.columns else None
-    units = parse_units(args.units) if args.units else None
+    must_be_writable(args.out)
+    measurements = [recording.measurement() for recording in read_data(args, *args.runs)]
     views = []
-    for path in args.runs:
-        recording = read_recording(existing(path), columns=columns, units=units)
-        fit = identify.fit(
-            recording.measurement(),
-            method=args.method,
-            law=args.law,
-            order=args.order,
-            contact=args.contact,
-            degree=args.degree,
-        )
+    for path, measurement in zip(args.runs, measurements, strict=True):
+        with status(f"fitting {path}") as progress:
+            fit = identify.fit(
+                measurement,
+                method=args.method,
+                law=args.law,
+                order=args.order,
+                contact=args.contact,
+                degree=args.degree,
+                progress=progress,
+            )
         print("\n".join([str(path), *(f"  {line}" for line in fit_lines(fit))]))
         views.append((str(path), fit_view(fit)))
     write_comparison(args.out, views)

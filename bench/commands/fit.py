@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from bench.commands.options import add_columns, add_structure, existing
+from bench.commands.options import add_columns, add_structure, must_be_writable, read_data, status
 from bench.errors import EXIT_DONE
-
-if TYPE_CHECKING:
-    from bench.recording import Measurement
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,14 +32,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Fit and print; status 0 whatever the verdict."""
     from bench import identify
-    from bench.recording import parse_columns, parse_units, read_recording
     from bench.results import fit_lines
 
-    columns = parse_columns(args.columns) if args.columns else None
-    units = parse_units(args.units) if args.units else None
-    recordings = [read_recording(existing(path), columns=columns, units=units) for path in args.data]
-    measurements: list[Measurement] = [recording.measurement() for recording in recordings]
-    with _status(quiet=args.json == "-") as progress:
+    for path in (args.json, args.write, args.report):
+        must_be_writable(path)
+    recordings = read_data(args, *args.data)
+    measurements = [recording.measurement() for recording in recordings]
+    with status("fitting", quiet=args.json == "-") as progress:
         result = identify.fit(
             measurements,
             method=args.method,
@@ -57,7 +50,7 @@ def main(args: argparse.Namespace) -> int:
             sample_time=args.sample_time,
             **{name: getattr(args, name) for name in ("starts", "ramps") if getattr(args, name) is not None},
         )
-    text = json.dumps(result.to_json(), indent=2)
+    text = json.dumps(result.to_json(), indent=2, allow_nan=False)
     if args.json == "-":
         print(text)
     else:
@@ -72,14 +65,5 @@ def main(args: argparse.Namespace) -> int:
         from bench.fitview import fit_view
         from bench.report import write_report
 
-        write_report(args.report, recordings[0], fit_view(result))
+        write_report(args.report, recordings[0], fit_view(result), host=recordings[0].host)
     return EXIT_DONE
-
-
-@contextmanager
-def _status(quiet: bool) -> Iterator[Callable[[str], None]]:
-    """Says on standard error what is being tried, while it takes long."""
-    from rich.console import Console
-
-    with Console(stderr=True, quiet=quiet).status("fitting") as status:
-        yield lambda text: status.update(f"fitting: {text}")

@@ -3,7 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bench.errors import InputError
+
+if TYPE_CHECKING:
+    from bench.preflight import Preflight
+    from bench.recording import Recording
 
 
 def add_bench(parser: argparse.ArgumentParser) -> None:
@@ -38,10 +48,41 @@ def add_structure(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def existing(path: Path) -> Path:
-    """The path, if something is there; raises `InputError`."""
-    from bench.errors import InputError
+def read_data(args: argparse.Namespace, *paths: Path) -> list[Recording]:
+    """Recordings, run folders or CSV with the `--columns` and `--units` given; raises `InputError`."""
+    from bench.recording import parse_columns, parse_units, read_recording
 
-    if not path.exists():
-        raise InputError(str(path), "there is no such file or folder", "check the name")
-    return path
+    columns: Mapping[str, str] | None = parse_columns(args.columns) if args.columns else None
+    units: Mapping[str, str] | None = parse_units(args.units) if args.units else None
+    return [read_recording(path, columns=columns, units=units) for path in paths]
+
+
+def must_be_writable(path: str | Path | None) -> None:
+    """Raises `InputError` where a file cannot be written: said before the work whose result is to go there."""
+    if path is None or str(path) == "-":
+        return
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(str(path), "is a folder, not a file to write", "name a file in it")
+    if not path.parent.is_dir():
+        raise InputError(str(path), f"cannot be written: there is no folder {path.parent}", "make it, or name another")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InputError(str(path), "cannot be written: permission denied", "name a place that is yours")
+
+
+def say_plan(preflight: Preflight) -> None:
+    """What the protocol will do, on standard output; raises what stands against it, which is said there alone."""
+    refusal = preflight.refusal()
+    for line in preflight.lines(errors=refusal is None):
+        print(line)
+    if refusal is not None:
+        raise refusal
+
+
+@contextmanager
+def status(text: str, *, quiet: bool = False) -> Iterator[Callable[[str], None]]:
+    """Says on the terminal (standard error) what is going on while it takes long; yields what changes the words."""
+    from rich.console import Console
+
+    with Console(stderr=True, quiet=quiet).status(text) as shown:
+        yield lambda more: shown.update(f"{text}: {more}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from bench.commands.options import existing
+from bench.commands.options import status
 from bench.errors import EXIT_DONE, InputError
 
 
@@ -18,11 +18,12 @@ def main(args: argparse.Namespace) -> int:
     """Write model.yaml, fit.json and report.html of a run folder."""
     from bench.results import analyse
 
-    if not existing(args.run).is_dir():
+    if args.run.is_file():
         raise InputError(
             str(args.run), "is not a run folder", "for a single file use `padbench fit FILE --report HTML`"
         )
-    results = analyse(args.run)
+    with status("fitting the pad's model"):
+        results = analyse(args.run)
     print("\n".join(results.lines()))
     print(f"report: {results.report}")
     return EXIT_DONE

@@ -8,13 +8,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.commands.options import add_bench
+from bench.commands.options import add_bench, say_plan, status
+from bench.commands.progress import Progress
 from bench.errors import EXIT_DONE, EXIT_NO, InputError, Refused
 
 if TYPE_CHECKING:
     from bench.config import Bench
     from bench.predict import Prediction
-    from bench.preflight import Preflight
     from bench.run.runner import Outcome
 
 
@@ -36,60 +36,55 @@ def main(args: argparse.Namespace) -> int:
     from bench.config import load_bench, load_model, simulated
     from bench.preflight import check
     from bench.protocol import load_protocol
-    from bench.run.folder import make_folder
+    from bench.run.folder import discard, make_folder, must_be_free
     from bench.run.runner import Notes, run_protocol
     from bench.shipped import find_file
 
+    if args.operator is not None and not args.operator.strip():
+        raise InputError("--operator", "is empty", "give a name, or leave it out")
+    if args.out is not None:
+        must_be_free(args.out)
     protocol = load_protocol(args.protocol)
     bench = load_bench(args.bench)
     if args.simulated:
         bench = simulated(bench)
     believed = load_model(args.pad) if args.pad else None
     preflight = check(protocol, bench, believed)
-    _say(preflight)
-    refusal = preflight.refusal()
-    if refusal is not None:
-        raise refusal
+    say_plan(preflight)
     if not bench.all_simulated and not args.attended:
         raise Refused(
-            f"bench '{bench.name}' is real hardware: stand at it, a hand at its emergency stop, and say --attended "
-            "(or dry-run it with --simulated)"
+            f"bench '{bench.name}' is real hardware, and nobody is said to stand at it\n"
+            "  stand there, a hand at its emergency stop, and add --attended (or dry-run it with --simulated)"
         )
-    if isinstance(args.operator, str) and not args.operator.strip():
-        raise InputError("--operator", "is empty", "give a name, or leave it out")
     folder = make_folder(protocol.name, args.out, datetime.datetime.now())
     started = time.perf_counter()
-    with _Progress(preflight) as progress:
-        outcome = run_protocol(
-            protocol,
-            bench,
-            preflight.plan,
-            folder,
-            believed_text=find_file("pad", args.pad).read_text("utf-8") if args.pad else None,
-            notes=Notes(args.sample, args.operator, args.note, args.conditions),
-            progress=progress.tell,
-        )
+    try:
+        with Progress(preflight.duration_s + preflight.approach_s) as progress:
+            outcome = run_protocol(
+                protocol,
+                bench,
+                preflight.plan,
+                folder,
+                believed_text=find_file("pad", args.pad).read_text("utf-8") if args.pad else None,
+                notes=Notes(args.sample, args.operator, args.note, args.conditions),
+                progress=progress.tell,
+            )
+    except InputError:
+        discard(folder)  # no device has been reached: nothing was measured, and the same command may be given again
+        raise
     _say_outcome(outcome, bench, time.perf_counter() - started)
     _after(outcome, preflight.prediction)
     return EXIT_DONE if outcome.cause is None else EXIT_NO
 
 
 def _after(outcome: Outcome, prediction: Prediction) -> None:
-    from rich.console import Console
-
     from bench.results import analyse
 
-    console = Console()
-    with console.status("fitting the pad's model"):
+    with status("fitting the pad's model"):
         results = analyse(outcome.folder, prediction=prediction)
     for line in results.lines():
-        console.print(line, highlight=False, markup=False)
-    console.print(f"report: {results.report}", highlight=False, markup=False, soft_wrap=True)
-
-
-def _say(preflight: Preflight) -> None:
-    for line in preflight.lines():
         print(line)
+    print(f"report: {results.report}")
 
 
 def _say_outcome(outcome: Outcome, bench: Bench, wall_s: float) -> None:
@@ -105,35 +100,5 @@ def _say_outcome(outcome: Outcome, bench: Bench, wall_s: float) -> None:
         print(f"surface: {s.position_mm:.4f} mm ± {1e3 * s.std_mm:.1f} µm (motor frame)")
     if outcome.cause is not None:
         print(f"STOPPED: {outcome.cause}\n  what was measured until then is kept in {outcome.folder}")
-
-
-class _Progress:
-    """A progress bar over bench time, redrawn at most ten times a second."""
-
-    def __init__(self, preflight: Preflight) -> None:
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        self._bar = Progress(
-            TextColumn("{task.description:<28.28}"),
-            BarColumn(),
-            TextColumn("{task.completed:>6.1f} / {task.total:.0f} s bench time"),
-            TimeElapsedColumn(),
-            transient=True,
-        )
-        self._task = self._bar.add_task("connecting", total=preflight.duration_s + preflight.approach_s)
-        self._next = 0.0
-
-    def tell(self, bench_s: float, label: str) -> None:
-        """Called in every turn of the loop: cheap unless a tenth of a second has passed."""
-        now = time.perf_counter()
-        if now < self._next:
-            return
-        self._next = now + 0.1
-        self._bar.update(self._task, completed=bench_s, description=label)
-
-    def __enter__(self) -> _Progress:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+    if found.not_safe:
+        print(f"NOT SAFE: the motor's safe state could not be read back: {found.not_safe}\n  use the emergency stop")

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.commands.options import add_columns, existing
-from bench.errors import EXIT_DONE
+from bench.commands.options import add_columns, must_be_writable, read_data
+from bench.errors import EXIT_DONE, InputError
 
 if TYPE_CHECKING:
     from sim.model import Model
@@ -30,6 +30,7 @@ def main(args: argparse.Namespace) -> int:
     """Simulate and write CSV; with --like, also say how far the simulation is from the data."""
     from bench.config import load_model
 
+    must_be_writable(args.out)
     model = load_model(args.model)
     return _over_protocol(args, model) if args.protocol else _over_data(args, model)
 
@@ -40,7 +41,13 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
     from bench.protocol import load_protocol
     from bench.recording import write_csv
 
-    prediction = check(load_protocol(args.protocol), load_bench(args.bench), model).prediction
+    protocol = load_protocol(args.protocol)
+    if protocol.in_air:
+        raise InputError(args.protocol, "presses no pad (`approach: none`)", "name a protocol with an approach")
+    preflight = check(protocol, load_bench(args.bench), model)
+    for problem in preflight.errors:
+        print(f"note: on bench '{args.bench}' this would be refused: {problem}")
+    prediction = preflight.prediction
     time_s = prediction.time_s
     write_csv(args.out, time_s, prediction.position_mm, time_s, prediction.force_N)
     print(f"wrote {args.out}: {time_s.size} samples over {time_s[-1]:.1f} s")
@@ -50,11 +57,9 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
 def _over_data(args: argparse.Namespace, model: Model) -> int:
     import numpy as np
 
-    from bench.recording import parse_columns, parse_units, read_recording, write_csv
+    from bench.recording import write_csv
 
-    columns = parse_columns(args.columns) if args.columns else None
-    units = parse_units(args.units) if args.units else None
-    measured = read_recording(existing(args.like), columns=columns, units=units).measurement()
+    measured = read_data(args, args.like)[0].measurement()
     t, x, force_t = measured.position_time_s, measured.position_mm, measured.force_time_s
     force = model.simulate_at(t, x, force_t)
     if force_t.size == t.size and not np.array_equal(force_t, t):

@@ -19,6 +19,7 @@ from .laws import Family, exponential, polynomial, power
 from .noise import noise_of
 from .parameters import model_dict, parameters
 from .problem import Problem, build
+from .profile import not_told
 from .result import Evidence, FitResult, Trace
 from .select import Candidate, Choice, choose
 from .uncertainty import spread_of
@@ -50,6 +51,11 @@ def fit(
     best = choice.best.estimate
     spread = spread_of(problem, best)
     found, covariance, undetermined = parameters(problem, best, spread)
+    relative = {
+        n: p.std / p.value for n, p in found.items() if n[:2] in ("c_", "nu") and np.isfinite(p.std) and p.value
+    }
+    loose = not_told(problem, best, relative, spread.samples) if best.physical else set()
+    undetermined = [name for name in found if name in undetermined or name in loose]
     traces = _traces(problem, choice.best)
     structure = best.structure
     unit = problem.force_N**2

@@ -52,7 +52,7 @@ def _about(m: Measurement, noise: Noise, unilateral: bool) -> list[str]:
     if deepest.any() and float(depth.max()) > 0:
         rising = np.flatnonzero(np.abs(force - _first_level(force, depth)) > max(8 * noise.force_N, 0.01 * top))
         start = depth[rising[0]] / depth.max() if len(rising) else 0.0
-        if start > 0.3:
+        if start > 0.5:
             out.append(
                 f"The force rises only from {depth[rising[0]]:.4g} mm on: the surface may not be at 0 mm,"
                 " where the model has it."

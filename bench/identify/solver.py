@@ -47,7 +47,7 @@ def minimise(
         # What an undamped step could still gain, whatever the damping has grown to.
         if not free.any() or _promise(H, g, scale, free) <= max(tolerance * value, floor):
             return Solution(x, value, H, step, True)
-        for _ in range(12):
+        for _ in range(15):
             move = _step(H, g, scale, free, damping)
             tried = np.clip(x + move, lower, upper)
             actual_move = tried - x
@@ -56,10 +56,10 @@ def minimise(
             if gained > 0 and np.isfinite(gained):
                 break
             damping, grow = damping * grow, grow * 2
-            if damping > 1e12:
-                return Solution(x, value, H, step, _promise(H, g, scale, free) <= 1e-6 * value + floor)
-        else:
-            return Solution(x, value, H, step, _promise(H, g, scale, free) <= 1e-6 * value + floor)
+        else:  # no step gains: at the minimum to rounding, or stuck
+            left = _step(H, g, scale, free, 1e-12)
+            still = bool(np.all(np.abs(left) <= 1e-8 * (np.abs(x) + 1e-2)))
+            return Solution(x, value, H, step, still or _promise(H, g, scale, free) <= 1e-6 * value)
         # Where samples go in and out of contact the promise is never quite kept: then what is gained decides.
         idle = idle + 1 if gained <= max(tolerance, 1e-10) * value else 0
         if idle >= 3:

@@ -69,7 +69,7 @@ class Gram:
             A = self.matrix[index[:, :, None], index[:, None, :]].copy()
             diagonal = np.einsum("kii->ki", A)
             diagonal *= 1 + 1e-12
-            diagonal += 1e-12 * self.square
+            diagonal += 1e-12 * self.square + 1e-30
             b = self.right[index]
             a = np.linalg.solve(A, b[..., None])[..., 0]
             left = self.square - np.einsum("ki,ki->k", a, b)
@@ -108,7 +108,9 @@ class Starter:
 
     def _in_contact(self) -> list[Array]:
         # A pad that lets go shows no force: such samples would press a linear model into a false shape.
-        return [np.where(run.y > 0.02, run.weight, 0.0) for run in self.problem.runs]
+        kept = [np.where(run.y > 0.02, run.weight, 0.0) for run in self.problem.runs]
+        few = sum(float(w.sum()) for w in kept) < 0.02 * self.problem.weight
+        return [run.weight for run in self.problem.runs] if few else kept
 
     def first(self, order: int, count: int = 3) -> list[Array]:
         """The best few by grid search over law shape and rates."""

@@ -1,66 +1,115 @@
-"""One MCAP file being written: the library's writer, and when its bytes reach the disk."""
+"""One MCAP file being written, and when its bytes reach the disk.
+
+The records are the library's own (`mcap.records`), but for the messages (`mcap_chunk`) at every sample; a test holds
+the file against what the library's writer makes of the same calls, byte for byte.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+import zlib
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from mcap.writer import CompressionType, Writer
+import zstandard
+from mcap import records
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
 
 from bench.errors import InputError
+from bench.recording.mcap_chunk import ChunkBuffer
 from bench.recording.schemas import LIBRARY, Topic
 
 CHUNK_SIZE = 128 * 1024
 """Bytes before compression; what a torn or damaged chunk costs at most. A quarter of a second of a run is less."""
 
+_FOOTER_SIZE = 8 + 8 + 4
+
 
 class McapFile:
     """A new MCAP file with the given topics; the channel ids are the topics' own.
 
-    The library keeps messages in memory until a chunk is full; `flush` ends the chunk and hands it to the operating
-    system (safe from a killed process), `sync` brings it onto the disk (safe from a power cut). Chunks are zstd with
-    CRC. Raises OSError when the disk does not take the bytes.
+    Messages stay in memory until a chunk is full; `flush` ends the chunk and hands it to the operating system (safe
+    from a killed process), `sync` brings it onto the disk (safe from a power cut). Chunks are zstd with CRC. Raises
+    OSError when the disk does not take the bytes.
     """
 
     def __init__(self, path: Path, topics: Iterable[Topic], epoch_ns: int) -> None:
         self._stream = path.open("wb")
-        self._writer = Writer(self._stream, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
-        self._writer.start(profile="", library=LIBRARY)
+        self._chunk = ChunkBuffer()
+        self._schemas: list[records.Schema] = []
+        self._channels: list[records.Channel] = []
+        self._chunk_indices: list[records.ChunkIndex] = []
+        self._attachments: list[records.AttachmentIndex] = []
+        self._metadata: list[records.MetadataIndex] = []
+        self._counts: Counter[int] = Counter()
+        self._span_ns: tuple[int, int] | None = None
+        self._stream.write(MCAP0_MAGIC)
+        self._stream.write(_bytes(records.Header(profile="", library=LIBRARY)))
         for topic in topics:
-            schema_id = self._writer.register_schema(topic.schema_name, "jsonschema", topic.schema_bytes())
-            channel = self._writer.register_channel(topic.name, "json", schema_id, topic.metadata(epoch_ns))
-            assert channel == topic.id, "topics are written in the order of their ids"
+            self._define(topic, epoch_ns)
         self._stream.flush()
-        self._end_chunk: Callable[[], None] = self._writer.flush
-        self._finish: Callable[[], None] = self._writer.finish
-        self.add_message: Callable[[int, int, bytes, int, int], None] = self._writer.add_message
-        """(channel_id, log_time, data, publish_time, sequence); the library's own, for speed."""
 
-    def metadata(self, name: str, fields: dict[str, str]) -> None:
+    def _define(self, topic: Topic, epoch_ns: int) -> None:
+        """Schema and channel of a topic, into the first chunk."""
+        number = len(self._channels) + 1
+        assert number == topic.id, "topics are written in the order of their ids"
+        schema = records.Schema(id=number, name=topic.schema_name, encoding="jsonschema", data=topic.schema_bytes())
+        channel = records.Channel(
+            id=number, topic=topic.name, message_encoding="json", schema_id=number, metadata=topic.metadata(epoch_ns)
+        )
+        self._schemas.append(schema)
+        self._channels.append(channel)
+        self._chunk.data += _bytes(schema) + _bytes(channel)
+
+    def add_message(self, channel_id: int, log_ns: int, data: bytes, publish_ns: int, sequence: int) -> None:
+        """One message into the chunk; a full chunk is written."""
+        if self._chunk.add_message(channel_id, log_ns, data, publish_ns, sequence) > CHUNK_SIZE:
+            self._end_chunk()
+
+    def metadata(self, name: str, fields: Mapping[str, str]) -> None:
         """A metadata record, after the messages written so far."""
         self._end_chunk()
-        self._writer.add_metadata(name, fields)
+        offset, size = self._write(records.Metadata(name=name, metadata=dict(fields)))
+        self._metadata.append(records.MetadataIndex(offset=offset, length=size, name=name))
         self._stream.flush()
 
     def attachment(self, name: str, media_type: str, data: bytes, log_ns: int) -> None:
         """An attachment, after the messages written so far."""
         self._end_chunk()
-        self._writer.add_attachment(0, log_ns, name, media_type, data)
+        record = records.Attachment(create_time=0, log_time=log_ns, name=name, media_type=media_type, data=data)
+        offset, size = self._write(record)
+        self._attachments.append(
+            records.AttachmentIndex(
+                offset=offset,
+                length=size,
+                create_time=0,
+                log_time=log_ns,
+                data_size=len(data),
+                name=name,
+                media_type=media_type,
+            )
+        )
         self._stream.flush()
 
     def flush(self) -> None:
         """End the chunk and hand everything to the operating system."""
         self._end_chunk()
+        self._stream.flush()
 
     def sync(self) -> None:
         """`flush`, and wait until it is on the disk (some milliseconds)."""
-        self._end_chunk()
+        self.flush()
         os.fsync(self._stream.fileno())
 
     def finish(self) -> None:
         """Write index and footer, sync, close. Nothing may be written afterwards."""
-        self._finish()
+        self._end_chunk()
+        self._write(records.DataEnd(data_section_crc=0))
+        self._write_summary()
+        self._stream.write(MCAP0_MAGIC)
         self._stream.flush()
         os.fsync(self._stream.fileno())
         self._stream.close()
@@ -72,6 +121,98 @@ class McapFile:
         except OSError:
             # the descriptor is closed all the same; the first failure has been reported
             return
+
+    # -- inside ------------------------------------------------------------------------------------------------
+
+    def _write(self, record: records.McapRecord) -> tuple[int, int]:
+        """Append a record; returns its offset and size."""
+        data = _bytes(record)
+        offset = self._stream.tell()
+        self._stream.write(data)
+        return offset, len(data)
+
+    def _end_chunk(self) -> None:
+        """Write the chunk in progress with its message index, if there are messages in it."""
+        chunk = self._chunk
+        if chunk.empty:
+            return
+        data = bytes(chunk.data)
+        first_ns, last_ns = chunk.span_ns()
+        packed = zstandard.compress(data)
+        offset, size = self._write(
+            records.Chunk(
+                compression="zstd",
+                data=packed,
+                message_start_time=first_ns,
+                message_end_time=last_ns,
+                uncompressed_crc=zlib.crc32(data),
+                uncompressed_size=len(data),
+            )
+        )
+        index, offsets = chunk.index_records()
+        self._stream.write(index)
+        self._chunk_indices.append(
+            records.ChunkIndex(
+                message_start_time=first_ns,
+                message_end_time=last_ns,
+                chunk_start_offset=offset,
+                chunk_length=size,
+                message_index_offsets={channel: offset + size + at for channel, at in offsets.items()},
+                message_index_length=len(index),
+                compression="zstd",
+                compressed_size=len(packed),
+                uncompressed_size=len(data),
+            )
+        )
+        self._counts.update(chunk.counts())
+        before = self._span_ns or (first_ns, last_ns)
+        self._span_ns = (min(before[0], first_ns), max(before[1], last_ns))
+        chunk.clear()
+
+    def _write_summary(self) -> None:
+        """What stands behind the data: definitions again, statistics, indices, their places, and the footer."""
+        first_ns, last_ns = self._span_ns or (0, 0)
+        statistics = records.Statistics(
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts=self._counts,
+            chunk_count=len(self._chunk_indices),
+            message_count=self._counts.total(),
+            message_end_time=last_ns,
+            message_start_time=first_ns,
+            metadata_count=len(self._metadata),
+            schema_count=len(self._schemas),
+        )
+        groups: tuple[tuple[Opcode, Iterable[records.McapRecord]], ...] = (
+            (Opcode.SCHEMA, self._schemas),
+            (Opcode.CHANNEL, self._channels),
+            (Opcode.STATISTICS, [statistics]),
+            (Opcode.CHUNK_INDEX, self._chunk_indices),
+            (Opcode.ATTACHMENT_INDEX, self._attachments),
+            (Opcode.METADATA_INDEX, self._metadata),
+        )
+        start = self._stream.tell()
+        summary = bytearray()
+        offsets = bytearray()
+        for opcode, group in groups:
+            begin = len(summary)
+            for record in group:
+                summary += _bytes(record)
+            place = records.SummaryOffset(opcode, group_start=start + begin, group_length=len(summary) - begin)
+            offsets += _bytes(place)
+        offset_start = start + len(summary)
+        summary += offsets
+        footer = records.Footer(summary_start=start, summary_offset_start=offset_start, summary_crc=0)
+        footer.summary_crc = zlib.crc32(_bytes(footer)[: 9 + _FOOTER_SIZE - 4], zlib.crc32(summary))
+        self._stream.write(summary)
+        self._write(footer)
+
+
+def _bytes(record: records.McapRecord) -> bytes:
+    """A record with its opcode and length before it."""
+    builder = RecordBuilder()
+    record.write(builder)
+    return bytes(builder.end())  # type: ignore[no-untyped-call]  # the library leaves it without types
 
 
 def claim(path: Path) -> None:

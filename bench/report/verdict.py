@@ -89,7 +89,10 @@ def run_verdict(recording: Recording) -> Verdict | None:
     if ended.sound:
         return None
     if ended.kind == "stopped":
-        return Verdict("bad", "The run was stopped before its protocol ended", [f"First cause: {ended.cause}."])
+        said = [f"First cause: {ended.cause}."]
+        if unsafe := _given(recording.result or {}, "not_safe"):
+            said.append(f"The motor's safe state could not be confirmed: {unsafe}.")
+        return Verdict("bad", "The run was stopped before its protocol ended", said)
     if ended.kind == "unfinished":
         said = [f"First cause: {ended.cause}.", "The recording has no closing record: what follows is what was saved."]
         if recording.lost and recording.lost not in ended.cause:

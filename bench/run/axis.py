@@ -112,6 +112,8 @@ class Axis:
         self._item: Exchange[Any] | Pause | None = None
         self._pause_until_s = 0.0
         self.failures: list[DriverError] = []
+        self.refused: DriverError | None = None
+        """Why the motor did not take a move or a stop; the plan goes on without it, so the run must not."""
 
     # -- what is commanded -------------------------------------------------------------------------------------
 
@@ -243,7 +245,7 @@ class Axis:
         except DriverError as failure:
             self._steps = None
             self._item = None
-            self.failures.append(failure)
+            self.refused = failure
             return
         self._item = item
         if isinstance(item, Pause):

@@ -142,6 +142,11 @@ class Loop:
         self._force_latency_s = self.rig.load_cell.latency_s()
         self.monitor.expect_force_from(self.clock.now())
 
+    def end_measuring(self) -> None:
+        """The load cell is about to be stopped: its silence means nothing any more."""
+        self.measuring = False
+        self.monitor.expect_force_from(None)
+
     # -- for scripts -------------------------------------------------------------------------------------------
 
     def perform(self, steps: Steps[T]) -> Script[T]:
@@ -208,6 +213,10 @@ class Loop:
             sink.event(now, "motor_error", {"message": str(failure), "in_a_row": self._failed})
             if self._failed >= MAX_FAILED_POLLS or self.rig.motor.link.broken is not None:
                 monitor.violate(str(failure))
+        if axis.refused is not None:
+            sink.event(now, "motor_refused", {"message": str(axis.refused)})
+            monitor.violate(str(axis.refused))
+            axis.refused = None
         broken = self.rig.load_cell.link.broken
         if broken is not None and self.measuring:
             monitor.violate(str(broken))

@@ -13,9 +13,8 @@ from drivers.motor import Motor
 from drivers.wire import Clock, Link, Port, Steps, T, complete
 
 if TYPE_CHECKING:
-    from sim.world import World
-
     from bench.config import Bench
+    from sim.world import World
 
 
 @dataclass

@@ -27,7 +27,7 @@ from bench.run.loop import Loop
 from bench.run.rig import Rig, is_simulated, open_rig
 from bench.run.safety import Envelope, Monitor
 from bench.run.script import Findings, Run
-from drivers.errors import DriverError, PortError
+from drivers.errors import DriverError
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 HOST_PACKAGES = ("padbench", "numpy", "scipy", "numba", "pymodbus", "pyserial", "mcap")
@@ -80,10 +80,11 @@ def run_protocol(
     """
     try:
         rig = open_rig(bench)
-    except PortError as error:
-        raise InputError(bench.place((error.device, "port")), error.message) from error
+    except DriverError as error:
+        raise InputError(bench.place((error.device, "port")), f"{error.device}: {error.message}") from error
     with rig:
-        mode: Literal["inline", "process"] = "inline" if rig.world is not None and not rig.world.clock.wall else "process"
+        virtual = rig.world is not None and not rig.world.clock.wall
+        mode: Literal["inline", "process"] = "inline" if virtual else "process"
         with Recorder(folder / RECORDING, rig.clock, mode=mode) as recorder:
             recorder.begin(
                 _run_record(protocol, bench, notes or Notes()),
@@ -104,12 +105,18 @@ def _run(
     if progress is not None:
         tell = progress
         loop.on_turn = lambda now: tell(now - started, run.label)
-    cause = None
+    cause: str | None = None
+    failure: Exception | None = None
     with _operator_stop(loop):
         try:
             loop.run(run.phases())
         except Stopped as stop:
             cause = stop.cause
+        except InputError as error:
+            cause, failure = error.message, error
+        except Exception as error:  # a defect of ours: the motor is stopped all the same, then it is told
+            cause, failure = f"a defect of padbench: {type(error).__name__}: {error}", error
+        if cause is not None:
             recorder.log("error", cause)
             _wind_down(loop, run, cause)
     seconds = rig.clock.now() - started
@@ -121,16 +128,21 @@ def _run(
             "overruns": loop.axis.overruns,
             "traffic": rig.traffic(),
             "safe_state": run.found.safe_state,
+            **({"not_safe": run.found.not_safe} if run.found.not_safe else {}),
         }
     )
+    if failure is not None:
+        raise failure
     return Outcome(folder, cause or problem, run.found, seconds, loop.motor_count, loop.force_count)
 
 
 def _wind_down(loop: Loop, run: Run, cause: str) -> None:
     """Stop and make safe; a second failure is recorded beside the first, and never replaces it."""
+    loop.monitor.stopping = True  # before the loop's first turn, which would raise the first cause again
     try:
         loop.run(run.wind_down(cause))
-    except (Stopped, DriverError) as error:
+    except Exception as error:  # whatever it is, the first cause and the data come before it
+        run.found.not_safe = str(error)
         loop.sink.event(loop.clock.now(), "stop_incomplete", {"message": str(error)})
 
 

@@ -64,8 +64,8 @@ class Monitor:
         if self.cause is not None and not self.stopping:
             raise Stopped(self.cause)
 
-    def expect_force_from(self, now_s: float) -> None:
-        """From now on the load cell must keep coming."""
+    def expect_force_from(self, now_s: float | None) -> None:
+        """From now on the load cell must keep coming; None: it need not."""
         self._newest_force_s = now_s
 
     def expect_motor_from(self, now_s: float) -> None:

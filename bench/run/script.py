@@ -44,6 +44,8 @@ class Findings:
     surface: Surface | None = None
     surface_mm: float = 0.0
     safe_state: dict[str, Any] | None = None
+    not_safe: str = ""
+    """Why nobody can say that the motor is in its safe state; empty where it was read back."""
 
 
 class Run:
@@ -141,8 +143,9 @@ class Run:
             yield from mover.go(self._motor_frame(segment.target_mm), segment.speed_mm_s)
         elif segment.kind == "force_ramp":
             away = self._motor_frame(self.plan.start_mm)
+            noise = self.found.air.sigma_N if self.found.air is not None else 0.0
             self._stiffness_N_mm = yield from press(
-                loop, mover, segment.target_N, segment.name, segment.speed_mm_s, away
+                loop, mover, segment.target_N, segment.name, segment.speed_mm_s, away, noise
             )
         elif segment.kind == "force_hold":
             stiffness = self._stiffness_N_mm
@@ -157,15 +160,12 @@ class Run:
         state = self.bench.motor.safe_state
         loop.axis.go_silent()
         self.found.safe_state = yield from loop.perform(self.motor.safe_state(state))
-        loop.sink.event(self.clock.now(), "safe_state", {"state": state, **self.found.safe_state})
-        loop.measuring = False
-        cell = loop.rig.load_cell
-        yield from loop.perform_on(cell.stop(), cell.link)
+        loop.sink.event(self.clock.now(), "safe_state", {"asked": state, **self.found.safe_state})
+        yield from self._quieten()
 
     def wind_down(self, cause: str) -> Script[None]:
         """After a stop: decelerate, then the safe state. Nothing here lets an error hide the first cause."""
         loop = self.loop
-        loop.monitor.stopping = True
         loop.sink.event(self.clock.now(), "stopped", {"cause": cause})
         self.label = "stopping"
         if loop.axis.live:
@@ -179,9 +179,20 @@ class Run:
         try:
             yield from self.make_safe()
         except DriverError as error:
+            self.found.not_safe = str(error)
             loop.sink.event(self.clock.now(), "safe_state_failed", {"message": str(error)})
+            yield from self._quieten()
 
     # -- inside ------------------------------------------------------------------------------------------------
+
+    def _quieten(self) -> Script[None]:
+        """End the load cell's stream; that it does not listen is noted, and harms nobody."""
+        loop, cell = self.loop, self.loop.rig.load_cell
+        loop.end_measuring()
+        try:
+            yield from loop.perform_on(cell.stop(), cell.link)
+        except DriverError as error:
+            loop.sink.event(self.clock.now(), "load_cell_not_stopped", {"message": str(error)})
 
     def _go_live(self) -> Script[None]:
         """Read where the axis is, and hold it there from now on."""

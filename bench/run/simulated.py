@@ -17,6 +17,11 @@ def world_of(bench: Bench, clock: Literal["virtual", "wall"] | None = None) -> W
     `clock` ("wall", "virtual") overrides the file's. Raises `InputError` where the file describes what cannot be
     simulated.
     """
+    for key, other in (("motor", bench.load_cell.port), ("load_cell", bench.motor.port)):
+        if not getattr(bench, key).port.startswith("sim://") and other.startswith("sim://"):
+            message = f"{key}.port is real, and the other one is simulated: they share neither pad nor time"
+            cure = "make both real, or both simulated (--simulated does)"
+            raise InputError(bench.place((key, "port")), message, cure)
     truth = bench.simulation
     if truth is None or bench.pad_file is None or bench.sim_name is None:
         raise InputError(bench.place(("motor", "port")), "is simulated, but there is no `simulation` block", "add one")
@@ -37,7 +42,8 @@ def world_of(bench: Bench, clock: Literal["virtual", "wall"] | None = None) -> W
             )
         )
     except ValueError as error:
-        raise InputError(bench.place(("simulation",)), str(error)) from error
+        part = ("simulation", "faults") if truth.faults else ("simulation",)
+        raise InputError(bench.place(part), str(error)) from error
     register(world)
     return world
 

@@ -22,8 +22,8 @@ QUIET = 4.0  # noise deviations of force that count as force
 class Found:
     """An estimate: V (scaled), v, iterations, whether they converged, their history.
 
-    `attempts`: where each start led, best first, for a scheme with several. `notes`: plain sentences. `figures`: further
-    numbers of the scheme by name. `gamma_covariance`: of γ where it comes from other data than the filter.
+    `attempts`: where each start led, best first, for a scheme with several. `notes`: plain sentences. `figures`:
+    further numbers of the scheme by name. `gamma_covariance`: of γ where it comes from other data than the filter.
     """
 
     V: float

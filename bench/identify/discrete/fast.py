@@ -1,7 +1,7 @@
-"""The paper's fast method: γ on the rising ramps alone, then A and B in closed form over ramps and holds. One iteration.
+"""The paper's fast method: γ on rising ramps alone, then A and B in closed form over ramps and holds. One iteration.
 
-Phase (a), on a ramp so quick that nothing relaxes in it, has F = F^e(δ): A = B = 1, and γ is a least-squares fit of the
-law to the force samples of the ramp, as measured. Phase (b) is one ARX step (or, with `step="iv"`, ARX and then the
+Phase (a), on a ramp so quick that nothing relaxes in it, has F = F^e(δ): A = B = 1, and γ is a least-squares fit of
+the law to the force samples of the ramp, as measured. Phase (b) is one ARX step (or, with `step="iv"`, ARX and then the
 instrumental variable, which is consistent) over all the data.
 
 **Which ramps.** F = F^e(δ) holds for a pad that has recovered: on a later ramp of a staircase the force starts from
@@ -39,7 +39,7 @@ from .series import Data
 from .system import Structure
 
 MOST_LOSS = 0.05
-MOST_STEPS = 100  # of the instrumental variable
+MOST_STEPS = 40  # of the instrumental variable
 OTHER = "Use `--method continuous` or `iterative`, which take relaxation into account everywhere."
 
 
@@ -71,6 +71,16 @@ class _Phase:
     pieces: list[tuple[Array, Array]]
 
 
+def phase_a(data: Data, structure: Structure) -> Array | None:
+    """γ by phase (a) on the recovered ramps; None where the data have none."""
+    rested = [[r for r in ramps_of(m) if r.rising and r.recovered] for m in data.measurements]
+    try:
+        phase = _samples(data, structure, rested, "recovered")
+    except InputError:
+        return None
+    return _static(structure, phase)[0].x
+
+
 class Fast:
     """The scheme, for `outcome.fit`."""
 
@@ -93,6 +103,9 @@ class Fast:
         if not np.isfinite(V):
             raise InputError("fit", f"the ARX filter of order {structure.order} grows without end within these data",
                              "Try another order, or a longer --sample-time.")  # fmt: skip
+        covariance: Array = np.asarray(variance * np.linalg.pinv(fitted.matrix), dtype=np.float64)
+        if start is not None:  # a refit on part of the data
+            return Found(V, v, 1, True, [(V, v)], gamma_covariance=covariance)
         steady = v if self.step == "iv" else _instrumental(data, structure, v)
         loss = _loss(structure, gamma, phase, structure.filter(steady), data.T)
         if loss > MOST_LOSS:
@@ -103,7 +116,6 @@ class Fast:
                 f"Ramps must be quicker. {OTHER}",
             )
         figures = {"loss_in_ramp": loss, "bias_of_all_ramps": _bias(data, structure, every, rested)}
-        covariance = variance * np.linalg.pinv(fitted.matrix)
         notes = self._notes(figures, len(phase.pieces), len(phase.u))
         return Found(V, v, 1, True, [(V, v)], notes=notes, figures=figures, gamma_covariance=covariance)
 
@@ -128,7 +140,9 @@ class Fast:
         ]
         bias = figures["bias_of_all_ramps"]
         if np.isfinite(bias):
-            lines.append(f"By all rising ramps the law comes out {100 * bias:+.2g} % against recovered ones, at depth.")
+            lines.append(
+                f"By all rising ramps the law comes out {100 * bias:+.2g} % against recovered ones, at depth."
+            )
         return lines
 
 
@@ -140,7 +154,9 @@ def _samples(data: Data, structure: Structure, ramps: list[list[Ramp]], which: s
             inside = (m.force_time_s >= ramp.begin_s) & (m.force_time_s <= ramp.end_s) & (depth > 0)
             inside &= m.force_time_s <= m.fit_to_s
             if inside.any():
-                pieces.append((m.force_time_s[inside], depth[inside] / data.depth_mm, m.force_N[inside] / data.force_N))
+                pieces.append(
+                    (m.force_time_s[inside], depth[inside] / data.depth_mm, m.force_N[inside] / data.force_N)
+                )
     count = sum(len(t) for t, _, _ in pieces)
     need = structure.nonlinear + 1
     if count < need:
@@ -178,7 +194,7 @@ def _instrumental(data: Data, structure: Structure, v: Array) -> Array:
     """v with the instrumental variable's filter for the law's shape in it, by repeated steps."""
     for _ in range(MOST_STEPS):
         new = refined(data, structure, v)
-        still = bool(np.all(np.abs(new - v) <= 1e-9 * np.max(np.abs(v))))
+        still = bool(np.all(np.abs(new - v) <= 1e-7 * np.max(np.abs(v))))
         v = new
         if still:
             break
@@ -207,4 +223,3 @@ def _bias(data: Data, structure: Structure, every: list[list[Ramp]], rested: lis
     except InputError:
         return float("nan")
     return float(both[0] / both[1] - 1) if both[1] > 0 else float("nan")
-

@@ -2,9 +2,10 @@
 
 In turn, until the numbers stand still: γ by (16) with A and B held; then A and B by linear least squares with
 u = F^e(δ; γ), as an ARX system with b_0 = 1 held: F(k) − u(k) is regressed on F(k−i) and u(k−i), so the gain stays with
-γ and no rescaling is needed. It starts from A = B = 1 (a_i = b_i = 0), as the paper does for its fast form.
+γ and no rescaling is needed. It starts from A = B = 1 (a_i = b_i = 0), as the paper does for its fast form, with γ from
+the ramps on which that holds; where there are none, from all the data.
 
-The turns are a fixed-point iteration on two different criteria; V need not fall, and the fixed point is no minimum of V.
+The turns are a fixed-point iteration on two different criteria: V need not fall, and where they end is no minimum of V.
 With the instrumental variable in place of ARX it is one (see `iv`).
 """
 
@@ -22,6 +23,7 @@ from ..noise import noise_of
 from ..result import FitResult
 from . import outcome
 from .estimator import Found, arx_scores, relative_V, silent
+from .fast import phase_a
 from .linear import arx
 from .search import first_gamma, gamma_step
 from .series import Data
@@ -54,10 +56,7 @@ class Iterative:
 
     def estimate(self, data: Data, structure: Structure, quick: bool = False, start: Array | None = None) -> Found:
         """The fixed point of the turns; where the filter of a turn runs away, the best turn before it."""
-        none = np.zeros(structure.order)
-        v = start if start is not None else first_gamma(data, structure, none, none)
-        if v is None:
-            raise InputError("fit", "the elastic response alone cannot be fitted to these data")
+        v = start if start is not None else _begin(data, structure)
         left = None
         if start is None:
             noise = noise_of(data.on_grid()).force_N / data.force_N
@@ -65,7 +64,7 @@ class Iterative:
         before, history, converged = _force(data, structure, v), [], False
         for _ in range(TURNS):
             linear = arx(data, structure, v, left)
-            next_v = gamma_step(data, structure, structure.joined(v[: structure.nonlinear], linear))
+            next_v = gamma_step(data, structure, structure.joined(v[: structure.nonlinear], linear), 1e-9)
             if next_v is None:
                 break
             v, left = next_v, None
@@ -88,6 +87,17 @@ class Iterative:
     def scores(self, data: Data, structure: Structure, v: Array) -> list[Array]:
         """Those of the two steps."""
         return arx_scores(data, structure, v)
+
+
+def _begin(data: Data, structure: Structure) -> Array:
+    none = np.zeros(structure.order)
+    gamma = phase_a(data, structure)
+    if gamma is not None:
+        return structure.vector(float(gamma[0]), gamma[1:], none, none)
+    v = first_gamma(data, structure, none, none)
+    if v is None:
+        raise InputError("fit", "the elastic response alone cannot be fitted to these data")
+    return v
 
 
 def _force(data: Data, structure: Structure, v: Array) -> Array:

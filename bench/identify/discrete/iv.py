@@ -59,17 +59,16 @@ class Instrumental:
         history = [(V, v)]
         converged = False
         for _ in range(TURNS // 4 if quick else TURNS):
-            v = refined(data, structure, v)
-            v = gamma_step(data, structure, v, 1e-9)
-            if v is None:
-                v = before
+            turned = gamma_step(data, structure, refined(data, structure, v), 1e-9)
+            if turned is None:
                 break
-            v = _further(data, structure, before, v)
+            v = _further(data, structure, before, turned)
             V, last = relative_V(data, structure, v), V
             history.append((V, v))
             before = v
-            converged = V >= last * (1 - 1e-6) and to_gain(data, structure, v) <= NEAR * V
-            if converged or V >= last:
+            fell = 1 - V / last if last > 0 else 0.0
+            converged = bool(fell <= 1e-6 and to_gain(data, structure, v) <= NEAR * V)
+            if converged or fell <= 0:
                 break
         notes = [] if converged else [f"The turns did not come to rest ({len(history) - 1} of them)."]
         return Found(V, v, len(history) - 1, converged, history, notes=notes)

@@ -37,14 +37,20 @@ class Equations:
 
 def arx(data: Data, structure: Structure, v: Array, left: list[NDArray[np.bool_]] | None = None) -> Array:
     """(α, β) by ordinary least squares, u from the γ in v. `left`: rows to leave out (the pad has let go there)."""
-    systems = [arx_equations(run, structure, v, None if left is None else left[j]) for j, run in enumerate(data.runs)]
+    systems = [
+        arx_equations(run, structure, v, None if left is None else left[j]) for j, run in enumerate(data.runs)
+    ]
     target = np.concatenate([e.target[e.rows] for e in systems])
     regressors = np.concatenate([e.regressors[e.rows] for e in systems])
     return _scaled_lstsq(regressors, target)
 
 
 def arx_equations(
-    run: Series, structure: Structure, v: Array, left: NDArray[np.bool_] | None = None, now: Simulated | None = None
+    run: Series,
+    structure: Structure,
+    v: Array,
+    left: NDArray[np.bool_] | None = None,
+    now: Simulated | None = None,
 ) -> Equations:
     """The ARX equations of a run. Where a unilateral pad has let go u is the free surface's, as simulated with v."""
     out = now if now is not None else simulate(run, structure, v)
@@ -59,8 +65,8 @@ def arx_equations(
 def iv(data: Data, structure: Structure, v: Array) -> Array:
     """v after one step of the refined instrumental variable from the filter in it; v itself where that is no help.
 
-    Here b_0 is free, and goes into the gain afterwards (B/b_0, gain·b_0): the gain and the filter pull on the same thing,
-    and turns that hold one of them creep.
+    Here b_0 is free, and goes into the gain afterwards (B/b_0, gain·b_0): gain and filter pull on the same thing, and
+    turns that hold one of them creep.
     """
     size = 2 * structure.order + 1
     matrix, right = np.zeros((size, size)), np.zeros(size)

@@ -1,7 +1,7 @@
 """The paper's noniterative method, (15)-(17): the simulated output error minimised over θ = [a, b, γ] at once.
 
-Gauss-Newton steps with Marquardt's damping on exact gradients (the filter's sensitivities), b_0 = 1, l = r, k = 0. As in
-the paper nothing keeps the filter stable or a relaxation, and the search ends in the minimum next to its start.
+Gauss-Newton steps with Marquardt's damping on exact gradients (the filter's sensitivities), b_0 = 1, l = r, k = 0. As
+in the paper nothing keeps the filter stable or a relaxation, and the search ends in the minimum next to its start.
 
 **Starts.** The paper starts from "an initial guess" that it does not give. Here `starts` is how many: the first takes γ
 from the elastic response alone (a = b = 0) and a, b from ARX with that γ; the others are relaxations with shares and
@@ -116,7 +116,7 @@ def minima(ends: Sequence[Attempt]) -> list[float]:
     """The different V that converged searches ended at, least first."""
     out: list[float] = []
     for attempt in sorted(ends, key=lambda e: e.V):
-        if attempt.converged and (not out or attempt.V > out[-1] * (1 + SAME)):
+        if attempt.converged and (not out or attempt.V / out[-1] > 1 + SAME):
             out.append(attempt.V)
     return out
 

@@ -23,7 +23,7 @@ from . import choice
 from .estimator import Estimator, Found, relative_V
 from .series import Data, sampled
 from .spread import covariance, independent, relaxation_jacobian
-from .system import Structure, named, simulate, values
+from .system import SOFTEST, Structure, named, simulate, values
 
 RESOLVED = 1e-5  # of the largest force: no difference of errors below it means anything
 
@@ -118,7 +118,7 @@ def _result(
         noise_floor=noise.floor_N,
         fit_percent=100 * (1 - float(np.sqrt(V * data.weight)) / variation) if variation > 0 else 0.0,
         physical=reading.physical,
-        converged=found.converged,
+        converged=bool(found.converged),
         undetermined=reading.undetermined,
         held_out_rmse=_held_out(estimator, data, structure, found) * data.force_N,
         samples=int(data.weight),
@@ -149,7 +149,7 @@ class _Reading:
         self.notes: list[str] = []
         shares: tuple[float, ...] = ()
         rates: tuple[float, ...] = ()
-        rising = structure.family.rising(v[1:g]) and v[0] > 0
+        rising = structure.family.rising(v[1:g]) and bool(v[0] > SOFTEST)
         try:
             shares, rates = relaxation_of(filter, data.T, "zero_order")
             relaxes = True
@@ -191,7 +191,11 @@ class _Reading:
                 "elastic": structure.family.entry(law),
                 "relaxation": {"shares": list(shares), "rates": list(rates)},
                 "contact": "unilateral" if structure.unilateral else "bonded",
-                "std": {n: p.std for n, p in self.parameters.items() if np.isfinite(p.std) and n[:2] not in ("a_", "b_")},
+                "std": {
+                    n: p.std
+                    for n, p in self.parameters.items()
+                    if np.isfinite(p.std) and n[:2] not in ("a_", "b_")
+                },
             }
         }
 

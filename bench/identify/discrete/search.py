@@ -81,7 +81,11 @@ def everything(data: Data, structure: Structure, v: Array, max_steps: int = 200)
 
 
 def _solved(
-    data: Data, structure: Structure, normal: Callable[[Array], tuple[float, Array, Array]], v: Array, max_steps: int
+    data: Data,
+    structure: Structure,
+    normal: Callable[[Array], tuple[float, Array, Array]],
+    v: Array,
+    max_steps: int,
 ) -> Solution:
     lower, upper = structure.bounds()
     return minimise(normal, lambda x: system.cost(data, structure, x), v, lower, upper, max_steps, 1e-10)

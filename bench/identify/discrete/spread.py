@@ -18,7 +18,7 @@ def covariance(data: Data, structure: Structure, estimator: Estimator, found: Fo
     """Of v (P, P): M⁻¹ S M⁻ᵀ, M the slope of the sums that the scheme sets to zero, S their variance.
 
     S is summed over windows as long as the simulated residual remembers (Bartlett's kernel). What a scheme gets wrong
-    by construction (ARX under output noise) is in no standard error. γ from data of its own (`fast`) is carried through.
+    by construction (ARX under output noise) is in no standard error. γ from data of its own (`fast`) is carried on.
     """
     scores = estimator.scores(data, structure, found.v)
     S = _windowed(scores, memory(data, structure, found.v))

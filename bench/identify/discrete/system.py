@@ -17,6 +17,7 @@ from ..laws import Family
 from . import _kernel
 from .series import Data, Series
 
+SOFTEST = 1e-9  # gain, over the largest force: no stiffness at all
 LIMIT = 1e6  # times the largest measured force: beyond, a filter has run away
 
 
@@ -81,12 +82,12 @@ class Structure:
         """Of v: the law's own (wide), nothing for the filter, as in the paper."""
         free = np.full(2 * self.order, np.inf)
         family = self.family
-        return np.concatenate([[0.0], family.lower, -free]), np.concatenate([[np.inf], family.upper, free])
+        return np.concatenate([[SOFTEST], family.lower, -free]), np.concatenate([[np.inf], family.upper, free])
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """The model on one run: `force`, `elastic`, `let_go` (K,), `jacobian` (K, P) or (0, 0); `ok`: it did not run away."""
+    """The model on one run: `force`, `elastic`, `let_go` (K,), `jacobian` (K, P) or (0, 0); `ok`: not run away."""
 
     force: Array
     elastic: Array
