@@ -364,11 +364,11 @@ def call(exchange: Exchange[T], link: Link) -> T:
 
 def _serve(links: Sequence[Link], until_s: float, exchange: Exchange[Any] | None) -> None:
     clock = links[0].clock
-    ports = [link.port for link in links]
     while not (exchange is not None and exchange.done):
         now = clock.now()
         if now >= until_s:
             return
+        ports = [link.port for link in links if link.broken is None]  # a lost one would wake us for ever
         clock.wait(ports, min([until_s, *(link.wake_at() for link in links)]))
         for link in links:
             link.service()

@@ -1,14 +1,16 @@
 """The compiled part of the recursive estimator: history in blocks, and Gauss-Newton sweeps over it.
 
 **History.** Samples are averaged into blocks: in motion one a sample, in a hold blocks that grow with the time since it
-began, as relaxation slows down. Where the room is used up neighbours are joined two by two.
+began, as relaxation slows down. Where the room is used up neighbours at nearly the same depth are
+joined two by two.
 
-**Sweeps.** Several estimates (*members*) stand side by side, from different first guesses. Each is swept: its candidate
-is simulated over the history with its sensitivities (`_kernel.advance`, the same physics as the fit's), and Σ w e²,
-Jᵀ w e, Jᵀ w J are gathered on the way, some blocks a sample. Where the sweep before ended, and the costs compare, the
-candidate is dropped if it is worse than what it came from; at the end it is accepted, and gives the next candidate
-(Levenberg-Marquardt). As the states are simulated anew with every candidate, nothing of what was learned wrong early stays in them. (A recursion
-over the current sample alone was tried, and settled at wrong values: a run has only a handful of ramps.)
+**Sweeps.** Several estimates (*members*) stand side by side, from different first guesses. Each is swept: its
+candidate is simulated over the history with its sensitivities (`_kernel.advance`, the same physics as the fit's),
+and Σ w e², Jᵀ w e, Jᵀ w J are gathered on the way, some blocks a sample. Where the sweep before ended, and the
+costs compare, the candidate is dropped if it is worse than what it came from; at the end it is accepted, and gives
+the next candidate (Levenberg-Marquardt). As the states are simulated anew with every candidate, nothing of what
+was learned wrong early stays in them. (A recursion over the current sample alone was tried, and settled at wrong
+values: a run has only a handful of ramps.)
 
 x = [θ (k), log ν (r), log a (r+1)] in scaled units.
 """
@@ -122,11 +124,13 @@ def end_run(open_block: Array, whole: Ints, history: Array) -> None:
 
 @compiled("void(int64[::1], float64[:, ::1])")
 def _join(whole: Ints, history: Array) -> None:
-    """Neighbours two by two; a run's first block stays alone."""
+    """Neighbours two by two where they differ least in depth, half of the pairs; a run's first block stays alone."""
     n, out = whole[BLOCKS], 0
+    apart = np.median(np.abs(history[1, 1:n] - history[1, : n - 1]))
     i = 0
     while i < n:
         alone = history[0, i] < 0.0 or i + 1 == n or history[0, i + 1] < 0.0
+        alone = alone or abs(history[1, i + 1] - history[1, i]) > apart
         w = history[3, i] + (0.0 if alone else history[3, i + 1])
         first, t = history[0, i] < 0.0, history[4, i]
         u, y = history[1, i], history[2, i]
@@ -320,7 +324,9 @@ def update(
     whole[TURN] += 1
     m = whole[BEST] if whole[TURN] % 2 == 0 else (whole[TURN] // 2) % B
     done = numbers[m, ACCEPTED]
-    sweep(m, kind, unilateral, most, history, numbers, figures, X, gradients, matrices, H, dH, coupled, whole, bounds)
+    sweep(
+        m, kind, unilateral, most, history, numbers, figures, X, gradients, matrices, H, dH, coupled, whole, bounds
+    )
     if numbers[m, ACCEPTED] != done:
         least = math.inf
         for j in range(B):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,7 +36,7 @@ def condensed(problem: Problem, target: int = TARGET) -> tuple[Problem, list[NDA
         owner = _blocks(run, stretches, length, growth)
         runs.append(_averaged(run, owner))
         owners.append(owner)
-    short = Problem(tuple(runs), problem.depth_mm, problem.force_N)
+    short = replace(problem, runs=tuple(runs))
     return short, owners
 
 
@@ -68,4 +70,4 @@ def _averaged(run: Run, owner: NDArray[np.intp]) -> Run:
     u = np.bincount(owner, run.u) / count
     with np.errstate(invalid="ignore"):
         y = np.where(weight > 0, np.bincount(owner, run.weight * run.y) / weight, 0.0)
-    return Run(time, np.diff(time, prepend=time[0]), u, y, weight)
+    return Run(time, np.diff(time, prepend=time[0]), u, y, weight, run.surface)

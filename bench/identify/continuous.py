@@ -22,6 +22,7 @@ from .problem import Problem, build
 from .profile import not_told
 from .result import Evidence, FitResult, Trace
 from .select import Candidate, Choice, choose
+from .surface import doubtful, moved_mm, with_surfaces
 from .uncertainty import spread_of
 
 LAWS = ("exponential", "power", "polynomial")
@@ -47,6 +48,8 @@ def fit(
         raise InputError("--contact", f"there is no contact `{contact}`", "One of: auto, bonded, unilateral.")
     problem = build(measurements)
     noise = noise_of(problem.measurements)
+    problem = doubtful(problem, noise.floor_N)
+    families = [with_surfaces(family, problem) for family in families]
     choice = choose(problem, families, orders, contacts, progress or (lambda _: None))
     best = choice.best.estimate
     spread = spread_of(problem, best)
@@ -87,6 +90,7 @@ def fit(
         noise=noise,
         independent_samples=spread.samples,
         covariance=covariance,
+        surface_moved_mm=moved_mm(problem, structure.family, structure.split(best.x)[0]),
     )
 
 

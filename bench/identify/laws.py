@@ -42,6 +42,13 @@ class Family:
             return {"law": self.name, "alpha": [0.0] + [value for _, value, _ in numbers]}
         return {"law": self.name} | {name: value for name, value, _ in numbers}
 
+    def of_run(self, u: Array, theta: Array, surface: int | None, slopes: bool = True) -> tuple[Array, Array]:
+        """`shape` for one run; `surface`: which doubtful surface is the run's (`surface.Movable`), None where certain.
+
+        Without `slopes` the derivatives may be left out.
+        """
+        return self.shape(u, theta)
+
     def rising(self, theta: Array) -> bool:
         """Whether F^e never falls on the way down to D: what a pad's must not."""
         s, _ = self.shape(np.linspace(0.0, 1.0, 401), theta)

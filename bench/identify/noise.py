@@ -66,9 +66,10 @@ def _about_curve(t: Array, y: Array) -> tuple[Array, float]:
     span, quick = t[-1] - t[0], t[2] - t[0]
     basis = [np.ones(n), (t - t[0]) / span]
     basis += [np.exp(-(t - t[0]) / tau) for tau in np.geomspace(1.5 * quick, span / 2, terms)]
-    A = np.stack(basis, axis=1)
-    solution, _, rank, _ = np.linalg.lstsq(A, y - y.mean(), rcond=1e-9)
-    return y - y.mean() - A @ solution, float(n - rank)
+    # A projection: near-parallel columns cost a degree of freedom each, and do no harm.
+    Q, _ = np.linalg.qr(np.stack(basis, axis=1))
+    left = y - y.mean()
+    return left - Q @ (Q.T @ left), float(n - Q.shape[1])
 
 
 def _trimmed_square(e: Array) -> float:

@@ -11,6 +11,7 @@ from .estimate import NOTHING, Estimate
 from .motion import holds
 from .noise import Noise
 from .problem import Problem
+from .surface import moved_mm
 
 
 def about_data(problem: Problem, noise: Noise, unilateral: bool) -> list[str]:
@@ -151,6 +152,7 @@ def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
     if weights.sum() <= NOTHING:
         out.append("No positive stiffness fits these data: every parameter is lost.")
         return out
+    out += _surfaces(problem, estimate)
     slow = [1 / nu for nu, a in zip(rates, weights[1:], strict=True) if a > 0 and 1 / nu > 0.5 * span]
     if slow:
         out.append(
@@ -167,3 +169,15 @@ def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
         " Beyond that the model was not tried."
     )
     return out
+
+
+def _surfaces(problem: Problem, estimate: Estimate) -> list[str]:
+    """Where the surfaces that touch-off left in doubt were put."""
+    theta, _, _ = estimate.structure.split(estimate.x)
+    moved = moved_mm(problem, estimate.structure.family, theta)
+    return [
+        f"{m.name}: the surface was put {abs(1e3 * by):.1f} µm {'higher' if by > 0 else 'lower'} than touch-off said"
+        f" (its own doubt: {1e3 * m.surface_std_mm:.1f} µm)."
+        for m, by in zip(problem.measurements, moved, strict=True)
+        if by
+    ]

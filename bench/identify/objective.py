@@ -44,16 +44,14 @@ class Piece:
     let_go: NDArray[np.bool_]
 
 
-def simulate(
-    run: Run, structure: Structure, x: Array, derivatives: bool = False, shift: float = 0.0
-) -> Iterator[Piece]:
-    """The model on a run from rest, chunk by chunk; `shift` is added to the depth u."""
+def simulate(run: Run, structure: Structure, x: Array, derivatives: bool = False) -> Iterator[Piece]:
+    """The model on a run from rest, chunk by chunk."""
     theta, rates, weights = structure.split(x)
     r, P = structure.order, structure.size
     state, d_state, coupled = np.zeros(r + 1), np.zeros((r + 1, P)), np.zeros(1, dtype=np.int64)
     for at in run.chunks():
         n = at.stop - at.start
-        s, ds = structure.family.shape(run.u[at] + shift if shift else run.u[at], theta)
+        s, ds = structure.family.of_run(run.u[at], theta, run.surface, derivatives)
         force, elastic, gone = np.empty(n), np.empty(n), np.empty(n, dtype=np.bool_)
         jacobian = np.empty((n, P) if derivatives else (0, 0))
         _kernel.advance(
@@ -64,8 +62,8 @@ def simulate(
 
 
 def cost(problem: Problem, structure: Structure, x: Array) -> float:
-    """Σ w e², force in units of the problem's scale."""
-    total = 0.0
+    """Σ w e², force in units of the problem's scale, and what moved surfaces cost."""
+    total = float(prior_of(problem, structure) @ x**2)
     for run in problem.runs:
         for piece in simulate(run, structure, x):
             total += _kernel.squared(run.weight[piece.at], run.y[piece.at], piece.force)
@@ -73,15 +71,24 @@ def cost(problem: Problem, structure: Structure, x: Array) -> float:
 
 
 def normal_equations(problem: Problem, structure: Structure, x: Array) -> tuple[float, Array, Array]:
-    """Σ w e², Σ w e ∂F/∂x (P,), Σ w ∂F/∂x ∂F/∂xᵀ (P, P)."""
+    """Σ w e², Σ w e ∂F/∂x (P,), Σ w ∂F/∂x ∂F/∂xᵀ (P, P), each with the prior of the surfaces."""
     P = structure.size
-    total, gradient, matrix = 0.0, np.zeros(P), np.zeros((P, P))
+    prior = prior_of(problem, structure)
+    total, gradient, matrix = float(prior @ x**2), -prior * x, np.diag(prior)
     for run in problem.runs:
         for piece in simulate(run, structure, x, derivatives=True):
             total += _kernel.accumulate(
                 run.weight[piece.at], run.y[piece.at], piece.force, piece.jacobian, gradient, matrix
             )
     return total, gradient, matrix + np.tril(matrix, -1).T
+
+
+def prior_of(problem: Problem, structure: Structure) -> Array:
+    """What each x² costs, (P,): nothing but for moved surfaces, which are the last of θ."""
+    out = np.zeros(structure.size)
+    k, count = structure.family.size, len(problem.prior)
+    out[k - count : k] = problem.prior
+    return out
 
 
 def forces(problem: Problem, structure: Structure, x: Array) -> list[tuple[Array, NDArray[np.bool_], Array]]:

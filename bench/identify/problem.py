@@ -30,6 +30,8 @@ class Run:
     u: Array
     y: Array
     weight: Array
+    surface: int | None = None
+    """Which of the problem's doubtful surfaces this run presses; None: its surface is certain."""
 
     @property
     def size(self) -> int:
@@ -53,6 +55,10 @@ class Problem:
     where: tuple[NDArray[np.intp], ...] = ()
     """Of each run: where its force samples stand in the union grid."""
     notes: tuple[str, ...] = field(default=())
+    prior: tuple[float, ...] = ()
+    """Of each doubtful surface: what its shift squared (units of D) costs, in the units of Σ w e²."""
+    noise_square: float = 0.0
+    """Variance of the force's noise, scaled; the prior was weighed by it."""
 
     @property
     def weight(self) -> float:

@@ -33,7 +33,7 @@ from .starts import bounds_of
 from .uncertainty import independent_samples, spread_of
 
 POINTS = 400  # of the history
-ROOM = 8192  # blocks kept
+ROOM = 16384  # blocks kept
 SWEEP = 40  # blocks a sample
 KINDS = {"exponential": kernel.EXPONENTIAL, "power": kernel.POWER, "polynomial": kernel.POLYNOMIAL}
 FIRST_RATES = ((0.1, 3.0), (0.5, 30.0))  # 1/s: slowest and fastest of the first guesses
@@ -84,11 +84,11 @@ class Recursive:
             ]
         )
         self._kind = KINDS[law.name]
-        self._step = kernel.update.native
+        self._step, self._end = kernel.update.native, kernel.end_run.native  # compiled now, not in the run
         self._last_s = -math.inf
 
     def update(self, t: float, delta: float, force: float = math.nan) -> None:
-        """One sample: time in s, depth in mm, force in N (NaN: none). Raises ValueError where the time does not rise."""
+        """One sample: time in s, depth in mm, force in N (NaN: none). Raises ValueError for a time not later."""
         if not t > self._last_s:
             raise ValueError(f"the time must rise: {t} s after {self._last_s} s")
         self._last_s = t
@@ -101,7 +101,7 @@ class Recursive:
     def rest(self) -> None:
         """The next sample belongs to another run: its time is its own, the pad is at rest; what was learned stays."""
         self._last_s = -math.inf
-        kernel.end_run(self._open, self._whole, self._history)
+        self._end(self._open, self._whole, self._history)
 
     @property
     def blocks(self) -> int:
@@ -212,7 +212,9 @@ def _pulls(problem: Problem, noise_N: float) -> bool:
     return sum(int(np.count_nonzero((run.y < level) & (run.weight > 0))) for run in problem.runs) >= 3
 
 
-def _over(problem: Problem, family: Family, order: int, unilateral: bool) -> tuple[Estimate, dict[str, list[float]]]:
+def _over(
+    problem: Problem, family: Family, order: int, unilateral: bool
+) -> tuple[Estimate, dict[str, list[float]]]:
     """The recursion over all runs: where it ended, and its way there."""
     estimator = Recursive(family, order, problem.depth_mm, problem.force_N, unilateral)
     every = max(1, problem.size // POINTS)
@@ -243,7 +245,9 @@ def _settled(history: dict[str, list[float]]) -> bool:
     return True
 
 
-def _criterion(problem: Problem, estimate: Estimate, ended: list[tuple[Estimate, dict[str, list[float]]]]) -> float:
+def _criterion(
+    problem: Problem, estimate: Estimate, ended: list[tuple[Estimate, dict[str, list[float]]]]
+) -> float:
     best = min((e for e, _ in ended), key=lambda e: e.cost)
     n = independent_samples(problem, best.x, best.structure)
     return n * math.log(max(estimate.cost / problem.weight, 1e-12)) + estimate.structure.size * math.log(n)
@@ -252,7 +256,9 @@ def _criterion(problem: Problem, estimate: Estimate, ended: list[tuple[Estimate,
 def _traces(problem: Problem, estimate: Estimate) -> list[Trace]:
     simulated = objective.forces(problem, estimate.structure, estimate.x)
     out = []
-    for m, run, at, (force, _, _) in zip(problem.measurements, problem.runs, problem.where, simulated, strict=True):
+    for m, run, at, (force, _, _) in zip(
+        problem.measurements, problem.runs, problem.where, simulated, strict=True
+    ):
         counted = run.weight[at] > 0
         out.append(
             Trace(

@@ -100,6 +100,9 @@ class FitResult:
     noise: Noise | None = None
     independent_samples: float = math.nan
     """How many independent samples the residual is worth (its colour)."""
+    surface_moved_mm: list[float] = field(default_factory=list)
+    """Of each measurement, the depth that was added to its positions: its surface stands so much higher than touch-off
+    said, within touch-off's own doubt."""
     covariance: Array | None = None
     """Of `parameters`, in their order."""
     iterations: int | None = None
@@ -139,8 +142,13 @@ class FitResult:
         return self.traces[0].residual_N
 
     def to_json(self) -> dict[str, Any]:
-        """fit.json, as contracts.md has it; a scheme that counts its iterations adds them and V along the way."""
-        more = {} if self.iterations is None else {"iterations": self.iterations, "history": self.history.get("V", [])}
+        """fit.json, as contracts.md has it; a scheme that counts its iterations adds them and V along the way,
+        a fit that moved doubtful surfaces by how much (V is with them moved)."""
+        more: dict[str, Any] = {}
+        if self.iterations is not None:
+            more = {"iterations": self.iterations, "history": self.history.get("V", [])}
+        if any(self.surface_moved_mm):
+            more["surface_moved_mm"] = self.surface_moved_mm
         return {
             "method": self.method,
             "law": self.law,

@@ -29,28 +29,25 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
     - S from the scores J e themselves, summed over windows as long as the residual remembers (Bartlett's kernel):
       holds where the noise grows with depth or the model does not fit, poor where few samples carry a parameter;
     - S = Σ J_k γ(k−l) J_lᵀ with the residual's autocovariance γ over all the data: steady, but holds for even noise.
-    To it comes what the doubt of the surface found by touch-off moves x by. Variables at a bound have no spread.
+    The prior of a doubtful surface adds its own spread. Variables at a bound have none.
     """
     P = estimate.structure.size
-    scores, sensitivity, errors, surface = _per_sample(problem, estimate)
+    scores, sensitivity, errors = _per_sample(problem, estimate)
     total = sum(len(e) for e in errors)
     gamma, lags = _autocovariance(errors)
     free = _free(estimate)
     inverse = np.zeros((P, P))
     H = estimate.matrix[np.ix_(free, free)]
     inverse[np.ix_(free, free)] = _inverted(H)
-    by_scores = inverse @ _windowed(scores, 2 * lags) @ inverse
-    by_colour = inverse @ _coloured(sensitivity, gamma) @ inverse
+    believed = np.diag(objective.prior_of(problem, estimate.structure)) * problem.noise_square
+    by_scores = inverse @ (_windowed(scores, 2 * lags) + believed) @ inverse
+    by_colour = inverse @ (_coloured(sensitivity, gamma) + believed) @ inverse
     independent = total / _memory(gamma)
     freedom = min(independent / max(independent - free.sum(), 1.0), 3.0)  # what the fit itself took out of the residual
     widest = np.sqrt(np.maximum(np.maximum(np.diag(by_scores), np.diag(by_colour)), 0.0) * freedom)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.where(np.diag(by_colour) > 0, widest / np.sqrt(np.abs(np.diag(by_colour))), 1.0)
     covariance = by_colour * np.outer(ratio, ratio)
-    for j, m in enumerate(problem.measurements):
-        if m.surface_std_mm > 0:
-            shift = inverse @ surface[j] * (m.surface_std_mm / problem.depth_mm)
-            covariance = covariance + np.outer(shift, shift)
     return Spread(covariance, problem.weight / _memory(gamma))
 
 
@@ -86,37 +83,27 @@ def _inverted(H: Array) -> Array:
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
 
 
-def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
-    """Of each run, over the samples that count: scores e J, J, e; and Jᵀ ∂F/∂(shift of the depth).
+def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list[Array], list[Array]]:
+    """Of each run, over the samples that count: scores e J, J, e.
 
     In long data each row stands for m neighbours: Σ e J, Σ J/√m, Σ e/√m.
     """
     structure, x = estimate.structure, estimate.x
     m = max(1, int(np.ceil(problem.weight / MOST)))
-    scores, sensitivities, errors, surface = [], [], [], []
-    step = 1e-5
-    for j, run in enumerate(problem.runs):
-        doubtful = bool(problem.measurements) and problem.measurements[j].surface_std_mm > 0
-        pieces = objective.simulate(run, structure, x, derivatives=True)
-        above = objective.simulate(run, structure, x, shift=step) if doubtful else None
-        below = objective.simulate(run, structure, x, shift=-step) if doubtful else None
-        score_parts, J_parts, e_parts, moved = [], [], [], np.zeros(structure.size)
-        for piece in pieces:
+    scores, sensitivities, errors = [], [], []
+    for run in problem.runs:
+        score_parts, J_parts, e_parts = [], [], []
+        for piece in objective.simulate(run, structure, x, derivatives=True):
             counts = run.weight[piece.at] > 0
             J = piece.jacobian[counts]
             e = run.y[piece.at][counts] - piece.force[counts]
-            score, J_sum, e_sum = _summed(J * e[:, None], m), _summed(J, m), _summed(e[:, None], m)[:, 0]
-            score_parts.append(score)
-            J_parts.append(J_sum / np.sqrt(m))
-            e_parts.append(e_sum / np.sqrt(m))
-            if above is not None and below is not None:
-                slope = (next(above).force - next(below).force)[counts] / (2 * step)
-                moved += J.T @ slope  # H⁻¹ of it is how far x follows the surface
+            score_parts.append(_summed(J * e[:, None], m))
+            J_parts.append(_summed(J, m) / np.sqrt(m))
+            e_parts.append(_summed(e[:, None], m)[:, 0] / np.sqrt(m))
         scores.append(np.concatenate(score_parts))
         sensitivities.append(np.concatenate(J_parts))
         errors.append(np.concatenate(e_parts))
-        surface.append(moved)
-    return scores, sensitivities, errors, surface
+    return scores, sensitivities, errors
 
 
 def _summed(rows: Array, m: int) -> Array:

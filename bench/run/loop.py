@@ -112,10 +112,11 @@ class Loop:
         """
         rig, axis, clock, links, ports = self.rig, self.axis, self.clock, self.rig.links, self.rig.ports
         ready: Sequence[Port] = ports
+        due_s = [0.0] * len(links)
         while True:
             now = clock.now()
-            for link in links:
-                if link.port in ready or link.wake_at() <= now:
+            for link, link_due_s in zip(links, due_s, strict=True):
+                if link_due_s <= now or link.port in ready:
                     link.service()
             self._take(now)
             self.monitor.check()
@@ -129,11 +130,14 @@ class Loop:
             self.sink.tick(now)
             if self.on_turn is not None:
                 self.on_turn(now)
-            wake = min(axis.wake_at(), now + LONGEST_WAIT_S, *[link.wake_at() for link in links])
+            due_s = [link.wake_at() for link in links]
+            wake = min(axis.wake_at(), now + LONGEST_WAIT_S, *due_s)
             if self.measuring:
                 due = rig.load_cell.next_poll_s()
                 if due is not None and due < wake:
                     wake = due
+            if rig.load_cell.link.broken is not None or rig.motor.link.broken is not None:
+                ports = [link.port for link in links if link.broken is None]  # a lost port would wake us for ever
             ready = clock.wait(ports, wake)
 
     def begin_measuring(self) -> None:
@@ -227,6 +231,7 @@ class Loop:
         if problem is not None:
             monitor.violate(f"the recording cannot go on: {problem}")
 
-    def newest_position(self) -> float:
-        """The last measured position, mm, motor frame (NaN before the first)."""
-        return self.last_motor.position_mm if self.last_motor is not None else math.nan
+    @property
+    def last_gross_N(self) -> float:
+        """The last reading of the load cell (NaN before the first)."""
+        return self.last_force.gross_N if self.last_force is not None else math.nan

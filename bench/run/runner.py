@@ -76,7 +76,8 @@ def run_protocol(
     """Run the plan of a protocol on a bench and record it in `folder`.
 
     The first thing that goes wrong stops the motor, is recorded and comes back as `Outcome.cause`; the data are kept.
-    Raises `InputError` where a port cannot be opened or the recording cannot be made: nothing has moved then.
+    Raises `InputError` where a port cannot be opened, a device does not answer or the recording cannot be made:
+    nothing has been commanded then, and nothing is recorded that is worth keeping.
     """
     try:
         rig = open_rig(bench)
@@ -112,8 +113,8 @@ def _run(
             loop.run(run.phases())
         except Stopped as stop:
             cause = stop.cause
-        except InputError as error:
-            cause, failure = error.message, error
+        except InputError:
+            raise  # no device was reached, none was commanded
         except Exception as error:  # a defect of ours: the motor is stopped all the same, then it is told
             cause, failure = f"a defect of padbench: {type(error).__name__}: {error}", error
         if cause is not None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bench.config import Bench
-from bench.errors import Stopped
+from bench.errors import InputError, Stopped
 from bench.plan import Plan, Segment
 from bench.protocol import Approach, Protocol
 from bench.recording.types import StepMark
@@ -31,6 +31,17 @@ INSIDE_MM = 0.05
 
 STOP_PATIENCE_S = 1.0
 """How long a stopping axis is waited for before the safe state is applied all the same."""
+
+REST_MM_S = 1.0
+"""A free axis that is slower than this stands: the encoder's steps over `REST_S` are less."""
+
+REST_S = 0.05
+PUSHED_MM = 0.05
+PUSHED_N = 0.1
+"""So far, and with so much less force, a free axis has been pushed out of a pad."""
+
+REST_PATIENCE_S = 2.0
+"""How long a free axis that moves is waited for before it is energised."""
 
 WATCHDOG_S = 0.1
 """What a motor with a watchdog of its own is told: no command for so long, and it lets go."""
@@ -64,6 +75,7 @@ class Run:
         self.found = Findings()
         self.label = "starting"
         self._stiffness_N_mm = 1.0
+        self._identified = False
 
     # -- phases ------------------------------------------------------------------------------------------------
 
@@ -82,11 +94,18 @@ class Run:
         yield from self.make_safe()
 
     def start_devices(self) -> Script[None]:
-        """Identify both devices, start the load cell first, then clamp, energise and home the motor."""
+        """Identify both devices, start the load cell first, then clamp, energise and home the motor.
+
+        Raises `InputError` where one of them does not answer, or is not what the bench file says it is.
+        """
         loop, motor, cell = self.loop, self.motor, self.loop.rig.load_cell
         self.label = "connecting"
-        cell_identity = yield from loop.perform_on(cell.connect(), cell.link)
-        identity = yield from loop.perform(motor.connect())
+        try:
+            cell_identity = yield from loop.perform_on(cell.connect(), cell.link)
+            identity = yield from loop.perform(motor.connect())
+        except DriverError as error:
+            raise InputError(self.bench.place((error.device,)), str(error)) from error
+        self._identified = True
         loop.sink.event(
             self.clock.now(),
             "devices",
@@ -101,6 +120,7 @@ class Run:
         loop.begin_measuring()
         held = yield from loop.perform(motor.prepare(self._clamps()))
         loop.sink.event(self.clock.now(), "clamps", dict(held))
+        yield from self._await_rest()
         yield from loop.perform(motor.energise())
         yield from self._go_live()
         homed = yield from loop.perform(motor.is_homed())
@@ -159,6 +179,8 @@ class Run:
         self.label = "safe state"
         state = self.bench.motor.safe_state
         loop.axis.go_silent()
+        if not self._identified:
+            return  # nothing was commanded, and nobody knows what is at the end of the line: it stays so
         self.found.safe_state = yield from loop.perform(self.motor.safe_state(state))
         loop.sink.event(self.clock.now(), "safe_state", {"asked": state, **self.found.safe_state})
         yield from self._quieten()
@@ -193,6 +215,34 @@ class Run:
             yield from loop.perform_on(cell.stop(), cell.link)
         except DriverError as error:
             loop.sink.event(self.clock.now(), "load_cell_not_stopped", {"message": str(error)})
+
+    def _await_rest(self) -> Script[None]:
+        """A free axis may be moving (a pad pushes it out, a vertical one sinks): it is not caught in flight."""
+        loop = self.loop
+        give_up = self.clock.now() + REST_PATIENCE_S
+        while loop.last_force is None:
+            yield
+        force_N = loop.last_gross_N
+        first: MotorSample = yield from loop.perform(_one(self.motor.read()))
+        before = first
+        while True:
+            yield from loop.sleep(REST_S)
+            now: MotorSample = yield from loop.perform(_one(self.motor.read()))
+            speed = (now.position_mm - before.position_mm) / (now.time_s - before.time_s)
+            if abs(speed) < REST_MM_S:
+                break
+            if self.clock.now() > give_up:
+                raise Stopped(
+                    f"the axis moves by itself, at {speed:+.2f} mm/s, before it is energised: something pushes it "
+                    "(a pad, its own weight); see to it, and start again"
+                )
+            before = now
+        moved, fell = first.position_mm - now.position_mm, force_N - loop.last_gross_N
+        if moved > PUSHED_MM and fell > PUSHED_N:
+            raise Stopped(
+                f"the probe already touches something: the free axis was pushed back by {moved:.2f} mm, and the force "
+                f"fell by {fell:.2f} N; retract the probe (or lower the pad) and start again"
+            )
 
     def _go_live(self) -> Script[None]:
         """Read where the axis is, and hold it there from now on."""

@@ -27,8 +27,8 @@ class Table:
             text = [c.ljust(w) if k == 0 else c.rjust(w) for k, (c, w) in enumerate(zip(cells, widths, strict=True))]
             return f"| {' | '.join(text)} |"
 
-        rule = [("-" * w) if k == 0 else "-" * (w - 1) + ":" for k, w in enumerate(widths)]
-        return [line(grid[0]), f"|{'|'.join(f'-{r}-' for r in rule)}|", *[line(row) for row in grid[1:]]]
+        rule = ["-" * (w + 2) if k == 0 else "-" * (w + 1) + ":" for k, w in enumerate(widths)]
+        return [line(grid[0]), f"|{'|'.join(rule)}|", *[line(row) for row in grid[1:]]]
 
 
 @dataclass(frozen=True)

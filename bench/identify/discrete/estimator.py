@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .._kernel import Array
 from . import system
-from .linear import arx_equations
+from .linear import arx_equations, difference
 from .search import Attempt
 from .series import Data
 from .system import Structure, simulate
@@ -58,15 +58,27 @@ def output_error_scores(data: Data, structure: Structure, v: Array) -> list[Arra
     return out
 
 
-def arx_scores(data: Data, structure: Structure, v: Array) -> list[Array]:
-    """[w e ∂F/∂γ, regressors × equation error]: of the two-step scheme with ARX."""
+def arx_scores(data: Data, structure: Structure, v: Array, scaled: bool = False) -> list[Array]:
+    """[w e ∂F/∂γ, regressors × equation error]: of the two-step scheme with ARX; `scaled`: b_0 the best for α and β."""
+    g, r = structure.nonlinear, structure.order
+    simulated = [simulate(run, structure, v, "gamma") for run in data.runs]
+    equations = [arx_equations(run, structure, v, now=now) for run, now in zip(data.runs, simulated, strict=True)]
+    b_0 = 1.0
+    if scaled:
+        above, below = 0.0, 0.0
+        for e, now in zip(equations, simulated, strict=True):
+            own = difference(now.elastic, r) + e.regressors[:, r:] @ v[g + r :]
+            left = e.target + difference(now.elastic, r) - e.regressors[:, :r] @ v[g : g + r]
+            above += float(own[e.rows] @ left[e.rows])
+            below += float(own[e.rows] @ own[e.rows])
+        b_0 = above / below if below > 0 else 1.0
     out = []
-    for run in data.runs:
-        now = simulate(run, structure, v, "gamma")
-        equations = arx_equations(run, structure, v, now=now)
-        error = np.where(equations.rows, equations.target - equations.regressors @ v[structure.nonlinear :], 0.0)
+    for run, now, e in zip(data.runs, simulated, equations, strict=True):
+        own = difference(now.elastic, r) + e.regressors[:, r:] @ v[g + r :]
+        left = e.target + difference(now.elastic, r) - e.regressors[:, :r] @ v[g : g + r]
+        error = np.where(e.rows, left - b_0 * own, 0.0)
         by_gamma = now.jacobian * (run.weight * (run.y - now.force))[:, None]
-        out.append(np.concatenate([by_gamma, equations.regressors * error[:, None]], axis=1))
+        out.append(np.concatenate([by_gamma, e.regressors * error[:, None]], axis=1))
     return out
 
 

@@ -180,12 +180,16 @@ def _static(structure: Structure, phase: _Phase) -> tuple[Solution, float]:
         return float(e @ e), J.T @ e, J.T @ J
 
     lower, upper = structure.bounds()
-    ends = []
+    starts = []
     for theta in family.starts:
         s, _ = family.shape(phase.u, theta)
-        gain = max(float(s @ phase.y) / max(float(s @ s), 1e-300), 1e-6)
-        x = np.concatenate([[gain], theta])
-        ends.append(minimise(normal, lambda x: float(np.sum(error(x)[0] ** 2)), x, lower[:g], upper[:g], 100))
+        x = np.concatenate([[max(float(s @ phase.y) / max(float(s @ s), 1e-300), 1e-6)], theta])
+        starts.append((float(np.sum(error(x)[0] ** 2)), x))
+    starts.sort(key=lambda item: item[0])
+    ends = [
+        minimise(normal, lambda x: float(np.sum(error(x)[0] ** 2)), x, lower[:g], upper[:g], 100)
+        for _, x in starts[:2]
+    ]
     best = min(ends, key=lambda s: s.cost)
     return best, best.cost / max(len(phase.u) - g, 1)
 

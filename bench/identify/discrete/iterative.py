@@ -1,9 +1,12 @@
 """The paper's iterative method.
 
-In turn, until the numbers stand still: γ by (16) with A and B held; then A and B by linear least squares with
-u = F^e(δ; γ), as an ARX system with b_0 = 1 held: F(k) − u(k) is regressed on F(k−i) and u(k−i), so the gain stays with
-γ and no rescaling is needed. It starts from A = B = 1 (a_i = b_i = 0), as the paper does for its fast form, with γ from
-the ramps on which that holds; where there are none, from all the data.
+In turn, until the numbers stand still: γ by (16) with A and B held; then A and B by linear least squares with u =
+F^e(δ; γ), as an ARX system. b_0 = 1 of (13) is kept by `b_0="scaled"`: estimated with the others, and put into the
+gain (the usual way with Hammerstein models); with `b_0="fixed"` F(k) − u(k) is regressed on F(k−i) and u(k−i), and
+the gain stays with γ. The first ends in some ten turns; the second creeps, where gain and filter pull on the same
+thing, and need not arrive even without noise. They end at different filters where the ARX step is biased. It
+starts from A = B = 1 (a_i = b_i = 0), as the paper does for its fast form, with γ from the ramps on which that
+holds; where there are none, from all the data.
 
 The turns are a fixed-point iteration on two different criteria: V need not fall, and where they end is no minimum of V.
 With the instrumental variable in place of ARX it is one (see `iv`).
@@ -24,7 +27,7 @@ from ..result import FitResult
 from . import outcome
 from .estimator import Found, arx_scores, relative_V, silent
 from .fast import phase_a
-from .linear import arx
+from .linear import arx, arx_scaled
 from .search import first_gamma, gamma_step
 from .series import Data
 from .system import Structure, simulate
@@ -44,15 +47,21 @@ def fit(
     degree: int | None = None,
     progress: Callable[[str], None] | None = None,
     sample_time: float | None = None,
+    b_0: str = "scaled",
 ) -> FitResult:
-    """Fit one pad by turns of (16) and ARX. `sample_time` T in s (default: from the data)."""
-    return outcome.fit(Iterative(), measurements, law, order, contact, degree, progress, sample_time)
+    """Fit one pad by turns of (16) and ARX. `sample_time` T in s (default: from the data); `b_0`: scaled or fixed."""
+    if b_0 not in ("scaled", "fixed"):
+        raise InputError("fit", f"b_0 cannot be `{b_0}`", "One of: scaled, fixed.")
+    return outcome.fit(Iterative(b_0), measurements, law, order, contact, degree, progress, sample_time)
 
 
 class Iterative:
     """The scheme, for `outcome.fit`."""
 
     name = "iterative"
+
+    def __init__(self, b_0: str = "scaled") -> None:
+        self.b_0 = b_0
 
     def estimate(self, data: Data, structure: Structure, quick: bool = False, start: Array | None = None) -> Found:
         """The fixed point of the turns; where the filter of a turn runs away, the best turn before it."""
@@ -63,8 +72,11 @@ class Iterative:
             left = silent(data, structure, noise)
         before, history, converged = _force(data, structure, v), [], False
         for _ in range(TURNS):
-            linear = arx(data, structure, v, left)
-            next_v = gamma_step(data, structure, structure.joined(v[: structure.nonlinear], linear), 1e-9)
+            if self.b_0 == "scaled":
+                filtered = arx_scaled(data, structure, v, left)
+            else:
+                filtered = structure.joined(v[: structure.nonlinear], arx(data, structure, v, left))
+            next_v = gamma_step(data, structure, filtered, 1e-9)
             if next_v is None:
                 break
             v, left = next_v, None
@@ -86,7 +98,7 @@ class Iterative:
 
     def scores(self, data: Data, structure: Structure, v: Array) -> list[Array]:
         """Those of the two steps."""
-        return arx_scores(data, structure, v)
+        return arx_scores(data, structure, v, scaled=self.b_0 == "scaled")
 
 
 def _begin(data: Data, structure: Structure) -> Array:

@@ -1,8 +1,11 @@
 """The linear step: A and B by least squares, γ given. ARX as in the paper, or by instrumental variables.
 
-With u = F^e(δ; γ) and b_0 = 1 fixed (the gain is γ's, so the normalisation of (13) costs no rescaling),
+With u = F^e(δ; γ),
 
-    F(k) − u(k) = −Σ a_i F(k−i) + Σ b_i u(k−i) + error.
+    F(k) = −Σ a_i F(k−i) + b_0 u(k) + Σ b_i u(k−i) + error.
+
+b_0 = 1 of (13) is kept in one of two ways: *fixed*, where F(k) − u(k) is what is regressed and the gain stays with
+γ; or *scaled*, where b_0 is estimated and goes into the gain afterwards (B/b_0, gain·b_0).
 
 ARX takes this error as white. On a bench the noise sits on the measured force instead, so that it is in the
 regressors too, and the estimate stays wrong however long the data are. The refined instrumental variable (Young; the
@@ -36,13 +39,25 @@ class Equations:
 
 
 def arx(data: Data, structure: Structure, v: Array, left: list[NDArray[np.bool_]] | None = None) -> Array:
-    """(α, β) by ordinary least squares, u from the γ in v. `left`: rows to leave out (the pad has let go there)."""
+    """(α, β) by ordinary least squares with b_0 fixed, u from the γ in v. `left`: rows to leave out."""
     systems = [
         arx_equations(run, structure, v, None if left is None else left[j]) for j, run in enumerate(data.runs)
     ]
     target = np.concatenate([e.target[e.rows] for e in systems])
     regressors = np.concatenate([e.regressors[e.rows] for e in systems])
     return _scaled_lstsq(regressors, target)
+
+
+def arx_scaled(data: Data, structure: Structure, v: Array, left: list[NDArray[np.bool_]] | None = None) -> Array:
+    """v after an ARX step with b_0 estimated and put into the gain; v itself where it comes out negative."""
+    targets, columns = [], []
+    for j, run in enumerate(data.runs):
+        out = simulate(run, structure, v)
+        e = arx_equations(run, structure, v, None if left is None else left[j], out)
+        now = difference(out.elastic, structure.order)
+        targets.append((e.target + now)[e.rows])
+        columns.append(np.concatenate([now[:, None], e.regressors], axis=1)[e.rows])
+    return _rescaled(structure, v, _scaled_lstsq(np.concatenate(columns), np.concatenate(targets)))
 
 
 def arx_equations(
@@ -52,11 +67,11 @@ def arx_equations(
     left: NDArray[np.bool_] | None = None,
     now: Simulated | None = None,
 ) -> Equations:
-    """The ARX equations of a run. Where a unilateral pad has let go u is the free surface's, as simulated with v."""
+    """The ARX equations of a run, b_0 fixed. Where a unilateral pad has let go u is the surface's as simulated."""
     out = now if now is not None else simulate(run, structure, v)
     u = out.elastic
     gone = out.let_go if left is None else left
-    target = _power(run.y, structure.order, 0) - _power(u, structure.order, 0)
+    target = difference(run.y, structure.order) - difference(u, structure.order)
     regressors = np.concatenate([-_basis(run.y, structure.order), _basis(u, structure.order)], axis=1)
     rows = _rows(run, structure.order) & ~gone
     return Equations(target, regressors, regressors, rows)
@@ -65,8 +80,7 @@ def arx_equations(
 def iv(data: Data, structure: Structure, v: Array) -> Array:
     """v after one step of the refined instrumental variable from the filter in it; v itself where that is no help.
 
-    Here b_0 is free, and goes into the gain afterwards (B/b_0, gain·b_0): gain and filter pull on the same thing, and
-    turns that hold one of them creep.
+    b_0 is scaled: gain and filter pull on the same thing, and turns that hold one of them creep.
     """
     size = 2 * structure.order + 1
     matrix, right = np.zeros((size, size)), np.zeros(size)
@@ -77,12 +91,7 @@ def iv(data: Data, structure: Structure, v: Array) -> Array:
         Z = e.instruments[e.rows]
         matrix += Z.T @ e.regressors[e.rows]
         right += Z.T @ e.target[e.rows]
-    found = _scaled_solve(matrix, right)
-    b_0 = float(found[0])
-    if not 0.1 < b_0 < 10:
-        return v
-    r, g = structure.order, structure.nonlinear
-    return np.concatenate([[v[0] * b_0], v[1:g], found[1 : 1 + r], found[1 + r :] / b_0])
+    return _rescaled(structure, v, _scaled_solve(matrix, right))
 
 
 def iv_equations(run: Series, structure: Structure, v: Array) -> Equations | None:
@@ -96,10 +105,10 @@ def iv_equations(run: Series, structure: Structure, v: Array) -> Equations | Non
     A = _stable(structure.filter(v))
     y, u, x = (np.asarray(lfilter([1.0], A, signal)) for signal in (y, out.elastic, out.force))
     r = structure.order
-    by_u = [_power(u, r, 0)[:, None], _basis(u, r)]
+    by_u = [difference(u, r)[:, None], _basis(u, r)]
     regressors = np.concatenate([by_u[0], -_basis(y, r), by_u[1]], axis=1)
     instruments = np.concatenate([by_u[0], -_basis(x, r), by_u[1]], axis=1)
-    return Equations(_power(y, r, 0), regressors, instruments, (run.weight > 0) & ~out.let_go)
+    return Equations(difference(y, r), regressors, instruments, (run.weight > 0) & ~out.let_go)
 
 
 def output_error(data: Data, structure: Structure, v: Array) -> Array:
@@ -125,12 +134,24 @@ def _stable(filter: Filter) -> Array:
     return np.real(np.poly(0.99999 * inside))
 
 
+def _rescaled(structure: Structure, v: Array, found: Array) -> Array:
+    b_0, r, g = float(found[0]), structure.order, structure.nonlinear
+    if not 0.1 < b_0 < 10:
+        return v
+    return np.concatenate([[v[0] * b_0], v[1:g], found[1 : 1 + r], found[1 + r :] / b_0])
+
+
 def _rows(run: Series, order: int) -> NDArray[np.bool_]:
     """Samples that count and whose past is measured."""
     rows = run.weight > 0
     for i in range(1, order + 1):
         rows[i:] &= run.has[:-i]
     return rows
+
+
+def difference(x: Array, order: int) -> Array:
+    """(1 − z⁻¹)^order x, from rest."""
+    return _power(x, order, 0)
 
 
 def _power(x: Array, order: int, delay: int) -> Array:

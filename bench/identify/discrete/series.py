@@ -131,9 +131,9 @@ def own_time(measurements: Sequence[Measurement]) -> float:
 def natural_time(measurements: Sequence[Measurement]) -> float:
     """The sample time where none is given: a whole multiple of the data's own spacing, near `LONGEST` at the most.
 
-    It is pulled two ways: noise on the force moves the poles of an ARX fit, the more the shorter T; and within T nothing
-    may relax, as the zero-order hold has it. At 10 ms that error is some thousandths for rates of a few 1/s. Short runs
-    take less, to keep `GRID` samples.
+    It is pulled two ways: noise on the force moves the poles of an ARX fit, the more the shorter T; and within T
+    nothing may relax, as the zero-order hold has it. At 10 ms that error is some thousandths for rates of a few
+    1/s. Short runs take less, to keep `GRID` samples.
     """
     own = own_time(measurements)
     longest = max(float(m.force_time_s[-1] - m.force_time_s[0]) for m in measurements)

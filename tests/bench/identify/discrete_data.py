@@ -1,4 +1,4 @@
-"""Data for the discrete methods: exact ones, whose elastic force stands still between samples, and the paper's staircase."""
+"""Data for the discrete methods: the paper's staircase, and jumps, for which a zero-order hold is exact."""
 
 from __future__ import annotations
 

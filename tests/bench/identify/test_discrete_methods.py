@@ -37,7 +37,7 @@ def on_exact(method: str, samples: int, noise_N: float, seed: int) -> FitResult:
     return fitted(m, method, sample_time=T, contact="bonded")
 
 
-# --- without noise every method that minimises over all the data finds the truth -------------------------------------
+# --- without noise every method that minimises over all the data finds the truth ---
 
 
 @pytest.mark.parametrize("method", ["noniterative", "iterative", "iv"])
@@ -62,7 +62,7 @@ def test_the_other_laws_are_fitted_too(law):
             assert f.parameters[name].value == pytest.approx(value, rel=5e-3), name
 
 
-# --- form --------------------------------------------------------------------------------------------------------------
+# --- form ---
 
 
 @pytest.mark.parametrize("method", DISCRETE)
@@ -80,10 +80,14 @@ def test_the_result_keeps_the_form(method, order):
     if f.physical:
         poles = np.exp(-np.array(pad.relaxation.rates) * 0.01)
         real = sorted((p[0] for p in out["filter"]["poles"]), reverse=True)
-        assert len(poles) == 0 or np.allclose(sorted(poles, reverse=True), real[: len(poles)], atol=1e-6) or order == 3
-        assert min(pad.relaxation.shares, default=1.0) >= 0 and pad.relaxation.c_0 >= -1e-9
+        assert (
+            len(poles) == 0
+            or np.allclose(sorted(poles, reverse=True), real[: len(poles)], atol=1e-6)
+            or order == 3
+        )
+        assert min(pad.relaxation.shares, default=1.0) >= 0 and sum(pad.relaxation.shares) <= 1 + 1e-9
     else:
-        assert pad.relaxation.shares == () and {"a_1", "b_1"} <= set(out["parameters"])
+        assert list(pad.relaxation.shares) == [] and {"a_1", "b_1"} <= set(out["parameters"])
         assert any("no relaxation" in note or "falls" in note for note in f.notes)
 
 
@@ -128,22 +132,24 @@ def test_what_cannot_be_asked_is_named(options, where):
     assert error.value.place == where
 
 
-# --- noniterative ------------------------------------------------------------------------------------------------------
+# --- noniterative ---
 
 
 def test_starts_show_their_ends():
     f = fitted(measurement(steps()), "noniterative", 3, starts=4)
     V = [a["V"] for a in f.attempts]
-    assert len(V) == 4 and V == sorted(V) and V[0] == pytest.approx(f.V)
+    assert len(V) == 4 and all(np.diff(V) >= 0) and V[0] == pytest.approx(f.V)
     assert f.history["V"][0] >= f.history["V"][-1]
 
 
 def test_own_starts_may_end_in_a_local_minimum():
     near = fitted(measurement(steps()), "noniterative", starts=[Start([-1.95, 0.955], [-1.97, 0.972])])
     ends = fitted(
-        measurement(steps()), "noniterative", starts=[Start([0.9, 0.0], [0.9, 0.0]), Start([-1.95, 0.955], [-1.97, 0.972])]
+        measurement(steps()),
+        "noniterative",
+        starts=[Start([0.9, 0.0], [0.9, 0.0]), Start([-1.95, 0.955], [-1.97, 0.972])],
     )
-    assert near.V == pytest.approx(ends.V, rel=1e-3) and len(ends.attempts) == 2
+    assert abs(near.V / ends.V - 1) < 1e-3 and len(ends.attempts) == 2
 
 
 def test_nested_orders_do_not_get_worse():
@@ -151,7 +157,7 @@ def test_nested_orders_do_not_get_worse():
     assert V[1] < 0.1 * V[0] and V[2] <= V[1] * 1.001
 
 
-# --- ARX is biased under output noise, the instrumental variable is not --------------------------------------------------
+# --- ARX is biased under output noise, the instrumental variable is not ---
 
 
 def errors(method: str, samples: int, seeds: range) -> np.ndarray:
@@ -166,8 +172,8 @@ def errors(method: str, samples: int, seeds: range) -> np.ndarray:
 
 
 def test_the_bias_of_arx_stays_and_that_of_iv_goes():
-    short, long = (errors("iv", n, range(6)) for n in (1000, 4000))
-    arx = errors("iterative", 4000, range(6))
+    short, long = (errors("iv", n, range(4)) for n in (600, 2400))
+    arx = errors("iterative", 2400, range(4))
     assert np.all(arx > 0.35)  # twice as fast as the truth, or more, in every draw
     assert np.median(np.abs(long)) < 0.02 and np.median(np.abs(long)) < np.median(np.abs(short))
     assert abs(long.mean()) < 3 * long.std(ddof=1) / math.sqrt(len(long)) + 2e-3
@@ -176,8 +182,8 @@ def test_the_bias_of_arx_stays_and_that_of_iv_goes():
 def test_standard_errors_of_iv_cover():
     truth = {"m": 2.24, "b": 0.69, "c_1": 0.25, "c_2": 0.15, "nu_1": 4.0, "nu_2": 0.35}
     inside = []
-    for seed in range(6):
-        f = on_exact("iv", 4000, 0.1, seed)
+    for seed in range(4):
+        f = on_exact("iv", 2400, 0.1, seed)
         inside += [abs(f.parameters[n].value - x) < 2.6 * f.parameters[n].std for n, x in truth.items()]
     assert np.mean(inside) > 0.85
 
@@ -193,14 +199,14 @@ def test_fast_with_the_instrumental_variable_is_consistent_too():
     assert np.allclose(slow["iv"], true, atol=3e-3) and not np.allclose(slow["arx"], true, atol=3e-3)
 
 
-# --- fast --------------------------------------------------------------------------------------------------------------
+# --- fast ---
 
 
 def test_fast_reads_the_law_on_the_first_ramp_and_all_ramps_make_it_soft():
     soft, right = [], []
-    for seed in range(5):
+    for seed in range(4):
         m = measurement(steps(seed, rate_hz=1000.0))
-        recovered, every = fitted(m, "fast"), fitted(m, "fast", ramps="all")
+        recovered, every = fitted(m, "fast", 1), fitted(m, "fast", 1, ramps="all")
         depth = 2.4
         true = 2.24 / 0.69 * math.expm1(0.69 * depth)
         law = [f.model.pad.law.force(depth).item() / true - 1 for f in (recovered, every)]
@@ -225,7 +231,7 @@ def test_fast_needs_a_recovered_pad():
         fitted(loaded, "fast")
 
 
-# --- against the sample time --------------------------------------------------------------------------------------------
+# --- against the sample time ---
 
 
 def test_numbers_over_sample_times():

