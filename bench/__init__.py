@@ -1,0 +1,1 @@
+"""What a person uses: commands, planning, runs, recordings, identification, reports."""

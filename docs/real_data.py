@@ -2,7 +2,7 @@
 
     python -m docs.real_data DATA_DIR [--out DIR] [--only FOLDER]
 
-Writes DIR/real_data.md and DIR/img/real_*.png (DIR: docs). The files are read from DATA_DIR and never copied.
+Writes DIR/real_data.md and DIR/img/measured_*.png (DIR: docs). The files are read from DATA_DIR and never copied.
 """
 
 from __future__ import annotations
@@ -185,14 +185,14 @@ def write(directory: Path, out: Path, sets: list[DataSet]) -> None:
     """The page and its pictures."""
     (out / "img").mkdir(parents=True, exist_ok=True)
     lines = [HEAD]
-    for data in sets:
+    for number, data in enumerate(sets, 1):
         rows = rows_of(directory, data)
         if not rows:
             lines += [f"## {data.title}", "", f"No files in `{data.folder}`.", ""]
             continue
         lines += [f"## {data.title}", "", f"`{data.folder}`, {len(rows)} files. {data.reading}", ""]
         if any(row.result for row in rows):
-            name = f"real_{data.folder}.png"
+            name = f"measured_{number}.png"
             picture(data, rows, out / "img" / name)
             lines += [f"![measured and simulated force](img/{name})", ""]
         lines += [*table(data, rows), ""]

@@ -1,0 +1,1 @@
+"""Ready protocols, benches and pads as YAML; data, shipped with the packages."""

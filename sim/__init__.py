@@ -1,0 +1,1 @@
+"""The physics, and the simulated devices that stand before it."""

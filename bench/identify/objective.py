@@ -72,7 +72,6 @@ def cost(problem: Problem, structure: Structure, x: Array) -> float:
 
 def normal_equations(problem: Problem, structure: Structure, x: Array) -> tuple[float, Array, Array]:
     """Σ w e², Σ w e ∂F/∂x (P,), Σ w ∂F/∂x ∂F/∂xᵀ (P, P), each with the prior of the surfaces."""
-    P = structure.size
     prior = prior_of(problem, structure)
     total, gradient, matrix = float(prior @ x**2), -prior * x, np.diag(prior)
     for run in problem.runs:

@@ -34,7 +34,7 @@ from .uncertainty import independent_samples, spread_of
 
 POINTS = 400  # of the history
 ROOM = 16384  # blocks kept
-SWEEP = 40  # blocks a sample
+SWEEP = 30  # blocks a sample
 KINDS = {"exponential": kernel.EXPONENTIAL, "power": kernel.POWER, "polynomial": kernel.POLYNOMIAL}
 FIRST_RATES = ((0.1, 3.0), (0.5, 30.0))  # 1/s: slowest and fastest of the first guesses
 SETTLED = 0.02  # F^e and rates moved by no more than this share in the last tenth of the run

@@ -8,7 +8,7 @@ from bench.errors import Stopped
 from bench.protocol import Approach
 from bench.run.loop import Loop, Script, Window
 from bench.run.motion import Mover
-from bench.run.touchoff import MIN_SAMPLES_IN_CONTACT, Air, Surface, air_of, find_surface, threshold_N
+from bench.run.touchoff import MIN_SAMPLES_IN_CONTACT, Air, Surface, air_of, surface_in_pieces, threshold_N
 
 TARE_S = 1.0
 """How long the zero is averaged: 550 samples of 10 mN noise give it to 0.4 mN."""
@@ -111,7 +111,7 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
     yield from mover.go_until(min(felt + BEYOND_MM, deepest), approach.speed / SLOWER, _above(loop, stop_at))
     yield from loop.sleep(0.02)
     mover.unwatch()
-    surface = _surface_of(window, air, position_sigma_mm)
+    surface = yield from _surface_of(window, air, position_sigma_mm)
     if surface is None:
         raise Stopped(
             f"the surface could not be measured: fewer than {MIN_SAMPLES_IN_CONTACT} samples of the slow approach "
@@ -166,7 +166,7 @@ def _average(loop: Loop, seconds: float) -> Script[float]:
     return total / count
 
 
-def _surface_of(window: Window, air: Air, position_sigma_mm: float) -> Surface | None:
+def _surface_of(window: Window, air: Air, position_sigma_mm: float) -> Script[Surface | None]:
     """The surface from the samples of the slow approach; positions are interpolated at the force samples."""
     t = np.array(window.force_time_s)
     motor_t = np.array(window.motor_time_s)
@@ -179,4 +179,4 @@ def _surface_of(window: Window, air: Air, position_sigma_mm: float) -> Surface |
         return None
     # What follows the deepest point is the braked stand: the pad relaxes there, and no longer tells its surface.
     end = int(np.argmax(x)) + 1
-    return find_surface(x[:end], force[:end], air.sigma_N, position_sigma_mm)
+    return (yield from surface_in_pieces(x[:end], force[:end], air.sigma_N, position_sigma_mm))

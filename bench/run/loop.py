@@ -16,7 +16,7 @@ from bench.recording.types import StepMark
 from bench.run.axis import Axis
 from bench.run.rig import Rig
 from bench.run.safety import Monitor
-from drivers.errors import DriverError
+from drivers.errors import DeviceTimeout, DriverError
 from drivers.loadcell import ForceSample
 from drivers.motor import MotorSample
 from drivers.wire import Pause, Port, Steps
@@ -27,8 +27,8 @@ Script = Generator[None, None, T]
 LONGEST_WAIT_S = 0.02
 """The loop turns at least so often, to look at the operator's stop and at how old the samples are."""
 
-MAX_FAILED_POLLS = 3
-"""So many exchanges with the motor may fail in a row before the run stops; the stale limit usually comes first."""
+MAX_REFUSED = 3
+"""So many exchanges in a row may be answered with an error before the run stops; silence is judged by its length."""
 
 
 class Sink(Protocol):
@@ -215,7 +215,8 @@ class Loop:
             failure = axis.failures.pop(0)
             self._failed += 1
             sink.event(now, "motor_error", {"message": str(failure), "in_a_row": self._failed})
-            if self._failed >= MAX_FAILED_POLLS or self.rig.motor.link.broken is not None:
+            answered = not isinstance(failure, DeviceTimeout)
+            if (answered and self._failed >= MAX_REFUSED) or self.rig.motor.link.broken is not None:
                 monitor.violate(str(failure))
         if axis.refused is not None:
             sink.event(now, "motor_refused", {"message": str(axis.refused)})

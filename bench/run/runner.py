@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import gc
 import hashlib
 import importlib.metadata
 import math
@@ -27,6 +28,7 @@ from bench.run.loop import Loop
 from bench.run.rig import Rig, is_simulated, open_rig
 from bench.run.safety import Envelope, Monitor
 from bench.run.script import Findings, Run
+from bench.run.touchoff import warm_up
 from drivers.errors import DriverError
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -83,7 +85,8 @@ def run_protocol(
         rig = open_rig(bench)
     except DriverError as error:
         raise InputError(bench.place((error.device, "port")), f"{error.device}: {error.message}") from error
-    with rig:
+    warm_up()
+    with rig, _undisturbed():
         virtual = rig.world is not None and not rig.world.clock.wall
         mode: Literal["inline", "process"] = "inline" if virtual else "process"
         with Recorder(folder / RECORDING, rig.clock, mode=mode) as recorder:
@@ -145,6 +148,17 @@ def _wind_down(loop: Loop, run: Run, cause: str) -> None:
     except Exception as error:  # whatever it is, the first cause and the data come before it
         run.found.not_safe = str(error)
         loop.sink.event(loop.clock.now(), "stop_incomplete", {"message": str(error)})
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """What is in memory by now is not searched for garbage during the run: that can take longer than a watchdog."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 @contextmanager

@@ -8,6 +8,7 @@ weighted by how well they fit: the doubt about the law is part of the uncertaint
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,9 @@ SIGMAS = 5.0
 """A touch must stand so many standard deviations of the air noise above the air level."""
 
 MIN_SAMPLES_IN_CONTACT = 4
+
+PIECE = 8
+"""So many least-squares fits between two looks at the motor."""
 
 
 @dataclass(frozen=True)
@@ -73,15 +77,33 @@ def threshold_N(asked_N: float, air: Air) -> float:
 
 
 def find_surface(position_mm: Array, force_N: Array, sigma_N: float, position_sigma_mm: float = 0.0) -> Surface | None:
+    """The surface from one approach, at once (see `surface_in_pieces`)."""
+    pieces = surface_in_pieces(position_mm, force_N, sigma_N, position_sigma_mm)
+    while True:
+        try:
+            next(pieces)
+        except StopIteration as end:
+            found: Surface | None = end.value
+            return found
+
+
+def surface_in_pieces(
+    position_mm: Array, force_N: Array, sigma_N: float, position_sigma_mm: float = 0.0
+) -> Generator[None, None, Surface | None]:
     """The surface from one approach: positions and net forces of shape (n,), in the order of time.
+
+    Yields after every half millisecond or so of computing: whoever has a motor to feed meanwhile, feeds it.
 
     The part in air fixes the level (a constant, so that what drifted since the tare does not move the surface), the
     part in contact the rise. Returns None when too little of the approach was in contact to say.
     `position_sigma_mm` (encoder noise, jitter of stamps) adds to the result's standard deviation.
     """
     sigma = max(sigma_N, 1e-12)
-    best = [_fit_exponent(position_mm, force_N, sigma, n) for n in EXPONENTS]
-    fits = [fit for fit in best if fit is not None]
+    fits: list[_Fit] = []
+    for n in EXPONENTS:
+        fit = yield from _fit_exponent(position_mm, force_N, sigma, n)
+        if fit is not None:
+            fits.append(fit)
     if not fits:
         return None
     chi2 = np.array([fit.chi2 for fit in fits])
@@ -100,6 +122,13 @@ def find_surface(position_mm: Array, force_N: Array, sigma_N: float, position_si
     )
 
 
+def warm_up() -> None:
+    """Have the numerical library set itself up now: the first call of its kind takes a stopping distance's time."""
+    x = np.linspace(0.0, 1.0, 50)
+    air_of(x, np.sin(50.0 * x))
+    find_surface(x, np.maximum(x - 0.5, 0.0), 1e-3)
+
+
 @dataclass(frozen=True)
 class _Fit:
     x0_mm: float
@@ -109,13 +138,17 @@ class _Fit:
     end_force_N: float
 
 
-def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> _Fit | None:
+def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Generator[None, None, _Fit | None]:
     """Least squares of level + k r^n + k' r^(n+1), r = max(0, x − x0): x0 by a grid that closes in, the rest linear."""
     span = float(x.max() - x.min())
     lo, hi = float(x.min()), float(x.max()) - 1e-6 * span
     for _ in range(4):
         grid = np.linspace(lo, hi, 41)
-        cost = np.array([_cost(x, force, x0, exponent)[0] for x0 in grid])
+        cost = np.empty(grid.size)
+        for i, x0 in enumerate(grid):
+            cost[i] = _cost(x, force, float(x0), exponent)[0]
+            if i % PIECE == PIECE - 1:
+                yield
         best = int(np.argmin(cost))
         lo, hi = grid[max(best - 2, 0)], grid[min(best + 2, grid.size - 1)]
     x0 = float(grid[best])
