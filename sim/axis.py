@@ -128,10 +128,11 @@ class BenchPlant:
         place = min(max(t_s / self._h, self._n - rows + 1, 0.0), float(self._n))
         low = min(int(place), max(self._n - 1, 0))
         share = place - low
-        before = float(self._history[low % rows, column])
+        value = self._history.item  # a Python number at once: half the time of indexing
+        before = value(low % rows, column)
         if share == 0.0:
             return before
-        return before + share * (float(self._history[(low + 1) % rows, column]) - before)
+        return before + share * (value((low + 1) % rows, column) - before)
 
     # what it is told
 

@@ -163,8 +163,7 @@ def serve(world: World, out: TextIO, stopped: Callable[[], bool] | None = None) 
             print(key, one.path, file=out, flush=True)
         ports = list(made.values())
         while not asked and not (stopped is not None and stopped()):
-            clock.wait(ports, clock.now() + LOOK_UP_S)
-            for port in ports:
+            for port in clock.wait(ports, clock.now() + LOOK_UP_S):
                 port.pump()
 
 

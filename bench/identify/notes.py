@@ -88,7 +88,8 @@ def _level_notes(m: Measurement, depth: Array, noise: Noise, top: float, unilate
             )
     elif abs(start) > large:
         out.append(
-            f"The force is {start:.3g} N before the probe has gone in: an offset or a preload, which the model has not."
+            f"The force is {start:.3g} N before the probe has gone in: an offset, a preload, or stamps of force"
+            " and position apart."
         )
     return out
 
