@@ -88,7 +88,7 @@ def parser(command: str | None) -> tuple[Parser, Parser]:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one command; returns the exit status of contracts.md."""
+    """Run one command; returns the exit status of docs/formats.md."""
     words = sys.argv[1:] if argv is None else argv
     command = next((word for word in words if not word.startswith("-")), None)
     top, named = parser(command)

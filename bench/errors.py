@@ -1,4 +1,4 @@
-"""The errors a person meets, and the exit status each ends with (contracts.md)."""
+"""The errors a person meets, and the exit status each ends with (docs/formats.md)."""
 
 from __future__ import annotations
 

@@ -125,6 +125,13 @@ def check(
     if bench.motor.orientation == "vertical" and bench.motor.safe_state == "release":
         message = "a vertical axis is let go in the safe state (motor.safe_state: release) and falls on the sample"
         problems.append(Problem("", message, "notice", cure="use hold or retract, unless a brake or spring carries it"))
+    if bench.motor.driver == "orca" and bench.motor.safe_state != "release":
+        message = (
+            f"motor.safe_state {bench.motor.safe_state}: an Orca holds only while it is told to; its watchdog lets go "
+            "when padbench has ended"
+        )
+        cure = "carry a vertical axis by a brake or a spring" if bench.motor.orientation == "vertical" else ""
+        problems.append(Problem("", message, "notice", cure=cure))
     duration_s = float(prediction.time_s[-1])
     approach_s = _approach_s(protocol, bench)
     total_s = duration_s + approach_s

@@ -1,7 +1,7 @@
 """How fast the devices of a bench file can be expected to answer, before any of them has been opened.
 
 For plans and preflight; a run uses what the opened drivers say. An Orca stream exchange is 9 + 19 bytes of 11 bits
-(devices.md 6), a DAD 141.1 `SW` line 21 bytes of 10 bits and at most 600 a second (3.1); a device with a register
+(docs/devices.md 6), a DAD 141.1 `SW` line 21 bytes of 10 bits and at most 600 a second (3.1); a device with a register
 map is read block by block, each a request of 8 bytes and a reply of 5 and two a register, behind its reply delay.
 """
 

@@ -1,6 +1,6 @@
 """Lines of the DAD 141.1: the combined string with its checksum, cut out of whatever comes.
 
-Format (devices.md 3.1): `W`, signed 6-digit net, signed 6-digit gross, two hex digits of status, two of checksum,
+Format (docs/devices.md 3.1): `W`, signed 6-digit net, signed 6-digit gross, two hex digits of status, two of checksum,
 then CR or CR LF. The checksum is the two's complement of the sum of the 17 characters before it (3.1.1); the example
 in the DAD 141 manual itself ends in another one, which is why checking can be switched off.
 """
@@ -17,7 +17,7 @@ MAX_LINE = 64
 """No line of this device is as long; what is, is noise without an end."""
 
 STATUS_FLAGS = {0: "stable", 1: "zeroed", 2: "tared", 5: "output_0", 6: "output_1", 7: "output_2"}
-"""Bits of the two status digits taken as one byte (devices.md 3.1; unused bits left out)."""
+"""Bits of the two status digits taken as one byte (docs/devices.md 3.1; unused bits left out)."""
 
 _COMBINED = re.compile(rb"W([+-]\d{6})([+-]\d{6})([0-9A-F]{2})([0-9A-F]{2})")
 _FLAGS = [tuple(name for bit, name in STATUS_FLAGS.items() if byte >> bit & 1) for byte in range(256)]

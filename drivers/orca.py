@@ -1,7 +1,7 @@
 """Iris Dynamics Orca linear motors: Modbus RTU with the vendor's position stream (function 0x64).
 
 Each stream exchange commands a position and returns position, force and errors in one reply, so that a sample costs
-nothing beyond the command. Facts and frames: devices.md 1 and 7.2, 7.3. Not used, because not confirmed (7.5): the
+nothing beyond the command. Facts and frames: docs/devices.md 1 and 7.2, 7.3. Not used, because not confirmed (7.5): the
 limits POS_MAX_VEL/ACCEL/DECEL, whose units are unknown, and functions 0x41, 0x68 and 0x69.
 
 Watchdog: the motor raises an error and produces no force when no command came for USER_COMMS_TIMEOUT. So `hold` lasts
@@ -38,7 +38,7 @@ from drivers.wire import Exchange, Link, Pause, Steps
 
 DEFAULT_BAUDRATE = 19200
 FAST_BAUDRATE = 625_000
-"""From here on the vendor's fast recipe applies: 80 µs between frames; below it the default, 2 ms (devices.md 7.3)."""
+"""From here on the vendor's fast recipe applies: 80 µs between frames; below it the default, 2 ms (docs/devices.md 7.3)."""
 
 TURNAROUND_S = 0.025
 """Longest wait for the beginning of a reply: what the vendor's SDK waits for a whole one."""
@@ -92,7 +92,8 @@ class Orca:
         self._last: MotorSample | None = None
         self._length: Callable[[bytearray], int] = self._modbus.rtu_length(STREAM, STREAM_REPLY_SIZE, b"")
         self._timeout_s = STREAM_TURNAROUND_S + link.wire_s(STREAM_REPLY_SIZE)
-        self._middle_offset_s = 0.5 * (link.wire_s(9) - link.wire_s(STREAM_REPLY_SIZE))
+        self._request_s = link.wire_s(9)
+        self._hold_back(0.0)
 
     # -- identity and clamps -----------------------------------------------------------------------------------
 
@@ -101,6 +102,7 @@ class Orca:
         words = yield self._modbus.read_holding(Register.SERIAL_NUMBER, 7)
         stator = (yield self._modbus.read_holding(Register.STATOR))[0]
         link = yield self._modbus.read_holding(Register.BAUDRATE, 3)
+        self._hold_back(1e-6 * link[2])
         zero_mode = (yield self._modbus.read_holding(Register.ZERO_MODE))[0]
         if stator not in STATORS:
             raise DriverError(
@@ -287,11 +289,24 @@ class Orca:
         """Not with this motor: it follows a stream of positions; raises `DriverError`."""
         raise DriverError(self.name, "an Orca follows a stream of positions; it is sent no moves")
 
+    def _hold_back(self, delay_s: float) -> None:
+        """The motor keeps a reply for its interframe delay: what it says was measured before that."""
+        self._modbus.reply_delay_s = delay_s
+        self._middle_offset_s = 0.5 * (self._request_s - self.link.wire_s(STREAM_REPLY_SIZE) - delay_s)
+
+    def _measured_s(self, sent_s: float, received_s: float) -> float:
+        """When the motor looked: between the end of the request and the reply it then held back."""
+        middle_s = 0.5 * (sent_s + received_s)
+        time_s = middle_s + self._middle_offset_s
+        asked_s = sent_s + self._request_s
+        # A reply quicker than the wire (a pseudo-terminal): the middle is all that is known.
+        return time_s if time_s >= asked_s else min(asked_s, middle_s)
+
     def _parse_stream(self, frame: bytes, sent_s: float, received_s: float) -> MotorSample:
         self._modbus.check_rtu("stream", frame)
         position_um, force_mN, _power, _temperature, _voltage, errors = command_reply(frame)
         sample = MotorSample(
-            0.5 * (sent_s + received_s) + self._middle_offset_s,
+            self._measured_s(sent_s, received_s),
             received_s,
             position_um * self._mm_per_um,
             force_mN * self._N_per_mN,

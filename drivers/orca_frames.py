@@ -1,6 +1,6 @@
 """Bytes of the Iris Dynamics Orca: its register addresses, error bits and the command stream.
 
-Sources: vendor's register header and SDK, in devices.md 1.2 (frames), 1.3 (registers, error bits), 7.2 (vectors).
+Sources: vendor's register header and SDK, in docs/devices.md 1.2 (frames), 1.3 (registers, error bits), 7.2 (vectors).
 """
 
 from __future__ import annotations

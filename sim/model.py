@@ -1,4 +1,4 @@
-"""The model file: a pad and its effects, as written in YAML (contracts.md, Model), and as something that runs."""
+"""The model file: a pad and its effects, as written in YAML (docs/formats.md, Model), and as something that runs."""
 
 from __future__ import annotations
 

@@ -20,6 +20,6 @@ def main(args: argparse.Namespace) -> int:
 
     columns = parse_columns(args.columns) if args.columns else None
     units = parse_units(args.units) if args.units else None
-    convert(args.source, args.target, columns=columns, units=units)
-    print(f"wrote {args.target}")
+    notes = convert(args.source, args.target, columns=columns, units=units)
+    print("\n".join([f"wrote {args.target}", *(f"  note: {note}" for note in notes)]))
     return 0

@@ -19,6 +19,6 @@ def main(args: argparse.Namespace) -> int:
     from bench.recording import recover
 
     out, report = recover(args.source, args.target)
-    print(report)
+    print("\n".join(report.lines()))
     print(f"wrote {out}")
-    return EXIT_LOST if report.lost else EXIT_DONE
+    return EXIT_LOST if report.status else EXIT_DONE

@@ -18,6 +18,7 @@ from .solver import minimise
 
 CERTAIN = 0.08  # relative standard error below which, for every mode, nothing bends
 FURTHER = (0.5, 1.5)  # of the value
+LOST = 0.5  # relative standard error that says so by itself
 
 
 def not_told(problem: Problem, estimate: Estimate, relative_std: dict[str, float], independent: float) -> set[str]:
@@ -33,6 +34,8 @@ def not_told(problem: Problem, estimate: Estimate, relative_std: dict[str, float
     out = set()
     for i in range(1, estimate.structure.order + 1):
         for name in (f"c_{i}", f"nu_{i}"):
+            if relative_std.get(name, np.inf) > LOST:
+                continue  # known to be lost already
             if any(_cost_at(short, best, name, i, factor) - best.cost < unit for factor in FURTHER):
                 out.add(name)
     return out

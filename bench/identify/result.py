@@ -1,4 +1,4 @@
-"""What a fit returns, and its form as fit.json (contracts.md)."""
+"""What a fit returns, and its form as fit.json (docs/formats.md)."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ class FitResult:
         return self.traces[0].residual_N
 
     def to_json(self) -> dict[str, Any]:
-        """fit.json, as contracts.md has it; a scheme that counts its iterations adds them and V along the way,
+        """fit.json, as docs/formats.md has it; a scheme that counts its iterations adds them and V along the way,
         a fit that moved doubtful surfaces by how much (V is with them moved)."""
         more: dict[str, Any] = {}
         if self.iterations is not None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from bench.errors import InputError
 
 NAMES = {"time": "time_s", "position": "position_mm", "force": "force_N", "force_time": "force_time_s"}
-"""What padbench calls its columns (contracts.md); `force_time` may be missing."""
+"""What padbench calls its columns (docs/formats.md); `force_time` may be missing."""
 
 REQUIRED = ("time", "position", "force")
 

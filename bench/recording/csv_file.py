@@ -1,4 +1,4 @@
-"""Force-displacement data in CSV as a `Recording` (columns: contracts.md, Data)."""
+"""Force-displacement data in CSV as a `Recording` (columns: docs/formats.md, Data)."""
 
 from __future__ import annotations
 

@@ -20,6 +20,9 @@ from bench.recording.types import Array, Measurement, Recording
 GAP = 5.0
 """A pause between samples of more than so many usual periods is reported."""
 
+UNPAIRED_S = 0.25
+"""Forces may outlast the positions by so much before it is reported."""
+
 SPIKE = 30.0
 """A sample is reported as a drop-out when it stands so many noise deviations away from both its neighbours …"""
 
@@ -70,8 +73,9 @@ def measurement_of(recording: Recording) -> Measurement:
         raise InputError(place, "holds fewer than two position samples", cure)
     fit_from, fit_to = _span(recording, place)
     inside = (force_time >= position_time[0]) & (force_time <= position_time[-1])
-    # A cell that is read before the motor answers is how every run begins: not worth a word.
-    outside = int(np.count_nonzero(~inside & (force_time >= fit_from)))
+    # A cell that is read a little longer than the motor is how every run begins and ends: not worth a word.
+    late = force_time > position_time[-1] + UNPAIRED_S
+    outside = int(np.count_nonzero(~inside & (force_time >= fit_from))) if late.any() else 0
     if outside:
         notes.append(f"{outside} force samples outside the time of the position samples left out")
     force_time, force = force_time[inside], force[inside]

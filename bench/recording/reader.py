@@ -12,7 +12,7 @@ from bench.recording.records import MAGIC
 from bench.recording.types import Recording
 
 RECORDING_FILE = "recording.mcap"
-"""What a run folder calls its recording (contracts.md)."""
+"""What a run folder calls its recording (docs/formats.md)."""
 
 
 def read_recording(

@@ -1,6 +1,6 @@
 """The bench file without its `simulation:` block, so that a recording's attachments never tell the truth.
 
-The block goes into the `padbench.simulation` record, which no fit reads (contracts.md).
+The block goes into the `padbench.simulation` record, which no fit reads (docs/formats.md).
 """
 
 from __future__ import annotations

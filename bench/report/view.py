@@ -46,7 +46,7 @@ class Evidence:
 class FitView:
     """A fit as the report shows it.
 
-    `json`: the content of fit.json (contracts.md). `time_s`, `position_mm` (pad frame), `measured_N`, `simulated_N`:
+    `json`: the content of fit.json (docs/formats.md). `time_s`, `position_mm` (pad frame), `measured_N`, `simulated_N`:
     shape (n,), at the force stamps, on the recording's clock; outside `fit_from_s` … `fit_to_s` they are history that
     cost nothing. `elastic`: F^e in N over depth in mm; `relaxation`: g over s. `evidence`: the structures tried.
     """

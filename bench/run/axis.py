@@ -121,6 +121,15 @@ class Axis:
         """The position commanded at a time, mm, motor frame."""
         return self._curve.position(now_s - self._start_s)
 
+    def lag_mm(self, time_s: float) -> float:
+        """How far a move motor may be behind the plan at a time: what was planned since two polls before.
+
+        It begins when it has taken the command, which no poll tells to better than that; a stream tells it exactly.
+        """
+        if self.motor.kind == "stream":
+            return 0.0
+        return abs(self.command(time_s) - self.command(time_s - 2.5 * self.period_s))
+
     def velocity(self, now_s: float) -> float:
         """The velocity commanded at a time, mm/s."""
         return self._curve.velocity(now_s - self._start_s)

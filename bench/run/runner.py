@@ -16,6 +16,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Literal
 
+import yaml
+
 from bench.config import Bench
 from bench.errors import InputError, Stopped
 from bench.plan import Plan
@@ -81,6 +83,7 @@ def run_protocol(
     Raises `InputError` where a port cannot be opened, a device does not answer or the recording cannot be made:
     nothing has been commanded then, and nothing is recorded that is worth keeping.
     """
+    bench = _as_sampled(bench, protocol)
     try:
         rig = open_rig(bench)
     except DriverError as error:
@@ -181,6 +184,17 @@ def _operator_stop(loop: Loop) -> Iterator[None]:
             signal.signal(number, handler)
 
 
+def _as_sampled(bench: Bench, protocol: Protocol) -> Bench:
+    """The bench with the load cell at the rate the protocol asks for: polled, since what a cell sends is its own."""
+    rate = protocol.sampling.load_cell
+    if rate is None:
+        return bench
+    update: dict[str, object] = {"rate": rate}
+    if bench.load_cell.driver == "dad141":
+        update["mode"] = "poll"
+    return bench.model_copy(update={"load_cell": bench.load_cell.model_copy(update=update)})
+
+
 def _envelope(bench: Bench, plan: Plan) -> Envelope:
     limits = bench.limits
     return Envelope(
@@ -238,4 +252,7 @@ def _attachments(protocol: Protocol, bench: Bench, believed_text: str | None) ->
     files: dict[str, str | bytes] = {"protocol.yaml": protocol.text, "bench.yaml": bench.text}
     if believed_text is not None:
         files["model.yaml"] = believed_text
+    for key, spec in (("motor", bench.motor), ("load_cell", bench.load_cell)):
+        if isinstance(spec.map, dict):
+            files[f"{key}_map.yaml"] = yaml.safe_dump(spec.map, sort_keys=False)
     return files

@@ -12,6 +12,9 @@ from bench.errors import Stopped
 from drivers.loadcell import ForceSample
 from drivers.motor import MotorSample
 
+SLACK_MM = 0.01
+"""How far a measured position may lie beyond a limit that a step goes to: encoder noise and the servo's overshoot."""
+
 
 @dataclass
 class Envelope:
@@ -85,18 +88,23 @@ class Monitor:
         elif abs(sample.gross_N) > e.gross_N:
             self.violate(f"gross force {sample.gross_N:.3f} N is beyond the {e.gross_N:g} N the cell may carry")
 
-    def motor(self, sample: MotorSample, command_mm: float, fault_names: tuple[str, ...]) -> None:
-        """Judge one motor sample against travel, depth, speed, following error and the device's own faults."""
+    def motor(
+        self, sample: MotorSample, command_mm: float, fault_names: tuple[str, ...], lag_mm: float = 0.0
+    ) -> None:
+        """Judge one motor sample against travel, depth, speed, following error and the device's own faults.
+
+        `lag_mm`: how far behind the command the axis may be because nobody knows when it began.
+        """
         e = self.envelope
         self._newest_motor_s = sample.received_s
         x = sample.position_mm
         if sample.fault:
             self.violate(f"the motor reports a fault: {', '.join(fault_names) or hex(sample.fault)}")
-        if not e.position_mm[0] - 1e-3 <= x <= e.position_mm[1] + 1e-3:
+        if not e.position_mm[0] - SLACK_MM <= x <= e.position_mm[1] + SLACK_MM:
             self.violate(f"travel limit: at {x:.3f} mm, allowed {e.position_mm[0]:g} to {e.position_mm[1]:g} mm")
-        if e.surface_mm is not None and x - e.surface_mm > e.depth_mm + 1e-3:
+        if e.surface_mm is not None and x - e.surface_mm > e.depth_mm + SLACK_MM:
             self.violate(f"depth limit: {x - e.surface_mm:.3f} mm into the pad, {e.depth_mm:g} mm allowed")
-        if self.watch_following and abs(command_mm - x) > e.following_error_mm:
+        if self.watch_following and abs(command_mm - x) > e.following_error_mm + lag_mm:
             self.violate(
                 f"following error: commanded {command_mm:.3f} mm, at {x:.3f} mm, "
                 f"allowed {e.following_error_mm:g} mm apart"

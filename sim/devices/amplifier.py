@@ -1,6 +1,6 @@
 """A strain-gauge amplifier of the Flintec DAD family: converter, digital filter, zero, tare, motion detection.
 
-Sources: devices.md 3.1; DAD 141.1 Technical Manual rev. 2.5 p. 30-42 (commands, filter table, ranges), DAS 72.1
+Sources: docs/devices.md 3.1; DAD 141.1 Technical Manual rev. 2.5 p. 30-42 (commands, filter table, ranges), DAS 72.1
 user guide p. 39 (FIR table of the same converter). The converter makes 600 values a second.
 
 Chosen here, since no manual says it: without filter and averaging a value is converted when it is asked for (so a

@@ -1,6 +1,6 @@
 """Flintec / H&B DAD 141.1 on its serial line: the ASCII protocol.
 
-Sources: devices.md 3.1 and 3.1.1; DAD 141.1 Technical Manual rev. 2.5 (H&B), chapters 9 and 10: forms of replies,
+Sources: docs/devices.md 3.1 and 3.1.1; DAD 141.1 Technical Manual rev. 2.5 (H&B), chapters 9 and 10: forms of replies,
 refusals, what needs an open calibration (CE), what takes effect after saving and restarting.
 
 Not documented, and chosen here: replies end with CR LF; 1 ms passes before a reply; UR, NR, NT and TD are reported
@@ -269,7 +269,7 @@ class Dad141:
         return self._decimal("H", self.amplifier.held)
 
     def _combined(self, at_s: float) -> str:
-        """`W`, net and gross without decimal point, two status nibbles, checksum (devices.md 3.1.1)."""
+        """`W`, net and gross without decimal point, two status nibbles, checksum (docs/devices.md 3.1.1)."""
         amplifier = self.amplifier
         gross = amplifier.gross(at_s)
         net = gross - amplifier.tare

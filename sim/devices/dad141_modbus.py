@@ -1,6 +1,6 @@
 """The DAD 141.1 by its Modbus map: over TCP (it has an Ethernet port), or RTU where the bench's map says so.
 
-Sources: devices.md 3.1; DAD 141.1 Modbus Communication manual rev. 2.3, p. 3-10: 32-bit values are read high word
+Sources: docs/devices.md 3.1; DAD 141.1 Modbus Communication manual rev. 2.3, p. 3-10: 32-bit values are read high word
 first (p. 4, register 202E: "the high word (202E) … and the low word (202F)").
 
 Not documented, and chosen here: floats are in the unit, with the decimal point applied; a request is answered

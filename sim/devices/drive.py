@@ -42,6 +42,9 @@ class Drive:
         self._noise = noise
         self._tick: Event | None = None
         self._pushing = False
+        # A vertical axis that nobody drives yet stands on something: a brake, a prop, a hand.
+        self._propped = plant.settings.vertical
+        plant.brake(self._propped)
 
     # -- readings ----------------------------------------------------------------------------------------------
 
@@ -62,6 +65,12 @@ class Drive:
         """Motor-frame position of a number of device counts."""
         return self.zero_mm + self.direction * counts * self.quantum_mm
 
+    def _unprop(self) -> None:
+        """The servo is on: whatever held the axis until then is taken away."""
+        if self._propped:
+            self._propped = False
+            self.plant.brake(False)
+
     def set_zero_here(self) -> None:
         """Let the device read 0 where it is."""
         self.zero_mm = self.plant.position_mm
@@ -81,11 +90,14 @@ class Drive:
         """Servo on, set-point now (motor frame)."""
         if self._pushing or self._tick is not None:
             self.take_over()
+        if self._propped:
+            self._unprop()
         self.plant.hold(position_mm)
 
     def profile(self, target_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> None:
         """A trapezoid to the target (motor frame)."""
         self.take_over()
+        self._unprop()
         self.plant.profile(target_mm, speed_mm_s, acceleration_mm_s2)
 
     def halt(self, deceleration_mm_s2: float = HARD_STOP_mm_s2) -> None:
@@ -101,6 +113,7 @@ class Drive:
     def press(self, force_N: float) -> None:
         """Push with a force (motor frame), whatever moves; 0 is free."""
         self.take_over()
+        self._unprop()
         if force_N == 0.0:
             self.plant.release()
         else:

@@ -1,4 +1,4 @@
-"""IAI ROBO Cylinder controller (PCON, ACON, SCON) on Modbus RTU: devices.md 2.1 and 7.1.
+"""IAI ROBO Cylinder controller (PCON, ACON, SCON) on Modbus RTU: docs/devices.md 2.1 and 7.1.
 
 Not documented there, and chosen here: alarm codes (0x80 move with the servo off, 0x81 table move and 0x83 direct
 move before homing, 0x84 move while homing, 0xA2 empty table row, 0xA3 position, speed or acceleration outside

@@ -1,8 +1,8 @@
 """Iris Dynamics Orca motor on Modbus RTU: registers, stream frames, modes, watchdog.
 
-Sources: devices.md 1.1 to 1.5, 7.2, 7.3. The interframe delay is the motor's wait before it answers.
+Sources: docs/devices.md 1.1 to 1.5, 7.2, 7.3. The interframe delay is the motor's wait before it answers.
 
-Not documented, and chosen here (devices.md 7.5): exception codes (the Modbus standard's); 0x41, 0x68 and 0x69 are
+Not documented, and chosen here (docs/devices.md 7.5): exception codes (the Modbus standard's); 0x41, 0x68 and 0x69 are
 served as in the 2023 SDK; commands act and values are taken when a request has arrived; the watchdog counts in
 force and position mode, and its error stays until sleep mode; SAFETY_DGAIN is taken as mN·s/mm; gains, filters and
 haptic effects are kept but do not act; the sensed force is that of the motor, without noise.
@@ -68,7 +68,7 @@ class Orca:
         self.server = RtuServer(line, address, functions, lambda pdu: self.delay_s, _REQUEST_SIZES)
         self.plant.release()
 
-    # -- stream frames (devices.md 1.2) --------------------------------------------------------------------------
+    # -- stream frames (docs/devices.md 1.2) --------------------------------------------------------------------------
 
     def _command_stream(self, pdu: bytes, at_s: float) -> bytes:
         code, value = _COMMAND_REQUEST.unpack(pdu)
@@ -133,7 +133,7 @@ class Orca:
         self.line.clock.schedule(at_s + self.delay_s + reply_size * self.line.byte_s, change)
         return _CONNECTION.pack(CHANGE_CONNECTION, state, baudrate, delay_us)
 
-    # -- registers (devices.md 1.3) ------------------------------------------------------------------------------
+    # -- registers (docs/devices.md 1.3) ------------------------------------------------------------------------------
 
     def read_registers(self, address: int, count: int, at_s: float) -> list[int]:
         """Registers as they are now."""

@@ -1,4 +1,4 @@
-"""Motions an Orca makes by itself: kinematic motions and the auto zero (devices.md 1.3, 7.3)."""
+"""Motions an Orca makes by itself: kinematic motions and the auto zero (docs/devices.md 1.3, 7.3)."""
 
 from __future__ import annotations
 

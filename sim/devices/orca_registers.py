@@ -1,4 +1,4 @@
-"""The Orca's register map (devices.md 1.3): addresses, what can be written, what is there after power-up.
+"""The Orca's register map (docs/devices.md 1.3): addresses, what can be written, what is there after power-up.
 
 Not documented, and chosen here: which registers refuse to be written (all that are status), the power-up values
 of everything but baudrate (19200), interframe delay (2000 µs) and address (1), the units of POS_MAX_VEL,

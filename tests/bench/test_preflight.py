@@ -181,10 +181,10 @@ def test_a_slower_speed_than_asked_is_said(tmp_path: Path, bench: Bench) -> None
 
 def test_latency_and_rates_follow_from_the_wire(bench: Bench) -> None:
     assert motor_rate_Hz(bench) == 1000.0
-    assert force_rate_Hz(bench) == pytest.approx(115200 / 210)  # 21 bytes of 10 bits: 549 a second (devices.md 6)
+    assert force_rate_Hz(bench) == pytest.approx(115200 / 210)  # 21 bytes of 10 bits: 549 a second (docs/devices.md 6)
     assert force_latency_s(bench) == pytest.approx(2 * 210 / 115200 + 1e-3)
     slow = bench.model_copy(update={"motor": bench.motor.model_copy(update={"baudrate": 115200})})
-    assert motor_rate_Hz(slow) == pytest.approx(374, abs=0.5)  # devices.md 6
+    assert motor_rate_Hz(slow) == pytest.approx(374, abs=0.5)  # docs/devices.md 6
 
 
 def test_a_force_target_ends_where_the_pad_says(tmp_path: Path, bench: Bench) -> None:

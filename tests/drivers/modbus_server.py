@@ -27,7 +27,7 @@ def words_of(kind: str, value: float) -> list[int]:
 
 
 class OrcaStreamReply(ModbusPDU):
-    """Function 0x64, reply: 15 data bytes (devices.md 1.2)."""
+    """Function 0x64, reply: 15 data bytes (docs/devices.md 1.2)."""
 
     function_code = 0x64
     rtu_frame_size = 19

@@ -14,7 +14,7 @@ from tests.drivers.scripted import Reply, octets, port_of, scripted_link
 
 Build = Callable[[ModbusClient], Exchange[object]]
 
-# Request and reply as the manuals print them (devices.md 7.1, 7.2).
+# Request and reply as the manuals print them (docs/devices.md 7.1, 7.2).
 PAIRS: list[tuple[str, Build, str, str, object]] = [
     (
         "IAI move, 9 words",

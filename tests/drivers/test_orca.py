@@ -1,4 +1,4 @@
-"""Orca: frames computed from the vendor's layout (devices.md 7.2), then a register image that misbehaves."""
+"""Orca: frames computed from the vendor's layout (docs/devices.md 7.2), then a register image that misbehaves."""
 
 from __future__ import annotations
 

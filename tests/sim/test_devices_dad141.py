@@ -25,7 +25,7 @@ def lines(client: Client, command: str, seconds: float) -> list[str]:
 
 
 def checksum(text: str) -> str:
-    """Two's complement of the sum of the characters (devices.md 3.1.1)."""
+    """Two's complement of the sum of the characters (docs/devices.md 3.1.1)."""
     return f"{(256 - sum(map(ord, text)) % 256) % 256:02X}"
 
 
@@ -113,7 +113,7 @@ def test_refused() -> None:
         assert client.command("DP 3") == "ERR"  # closed again
 
 
-# devices.md 6: 21 bytes at 115200 allow 549 lines a second, below the converter's 600.
+# docs/devices.md 6: 21 bytes at 115200 allow 549 lines a second, below the converter's 600.
 def test_continuous_output_is_paced_by_the_wire() -> None:
     with bench(**spring({"noise_force_N": 0.01})) as world:
         client = Client(world, "load_cell")

@@ -60,7 +60,7 @@ def iai(world: World) -> Iai:
     return device
 
 
-# Byte pairs of devices.md 7.1.
+# Byte pairs of docs/devices.md 7.1.
 @pytest.mark.parametrize(
     ("request_", "reply"),
     [
@@ -90,7 +90,7 @@ def test_frames_of_the_manual(request_: str, reply: str) -> None:
         assert Client(world, "motor").ask(bytes.fromhex(request_)) == bytes.fromhex(reply)
 
 
-# devices.md 7.1 and 6: parameter 17 (5 ms) and 1 ms inside, 8 + 25 bytes of 8N1 at 38400 (8594 µs on the wire).
+# docs/devices.md 7.1 and 6: parameter 17 (5 ms) and 1 ms inside, 8 + 25 bytes of 8N1 at 38400 (8594 µs on the wire).
 def test_reply_time_of_the_status_block() -> None:
     with bench(motor=IAI) as world:
         client = Client(world, "motor")

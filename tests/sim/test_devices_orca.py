@@ -13,7 +13,7 @@ NO_ERROR = 0
 
 
 def stream(client: Client, code: int, value: int) -> tuple[int, int, int, int, int, int]:
-    """One 0x64 exchange: position µm, force mN, power W, temperature °C, voltage mV, errors (devices.md 1.2)."""
+    """One 0x64 exchange: position µm, force mN, power W, temperature °C, voltage mV, errors (docs/devices.md 1.2)."""
     reply = client.ask(framed("01 64" + struct.pack(">Bi", code, value).hex()))
     assert len(reply) == 19
     assert reply[:2] == b"\x01\x64"
@@ -43,7 +43,7 @@ def orca(world: World) -> Orca:
     return device
 
 
-# Requests of devices.md 7.2 as they are on the wire, CRC included; replies laid out as in 1.2.
+# Requests of docs/devices.md 7.2 as they are on the wire, CRC included; replies laid out as in 1.2.
 @pytest.mark.parametrize(
     ("request_", "reply"),
     [
@@ -60,7 +60,7 @@ def test_frames_of_the_manual(request_: str, reply: str) -> None:
         assert Client(world, "motor").ask(bytes.fromhex(request_)).hex(" ") == framed(reply).hex(" ")
 
 
-# devices.md 6: 9 + 19 bytes of 8E1 at 115200 take 2674 µs; the motor waits 2000 µs in between.
+# docs/devices.md 6: 9 + 19 bytes of 8E1 at 115200 take 2674 µs; the motor waits 2000 µs in between.
 def test_wire_time_of_a_stream_exchange_is_exact() -> None:
     with bench() as world:
         client = Client(world, "motor")
@@ -235,7 +235,7 @@ def test_kinematic_mode_runs_home_then_what_is_triggered() -> None:
     with bench() as world:
         client = Client(world, "motor")
         write(client, 780, 1000, 0, 100, 0, 0, 0)  # motion 0: 1 mm in 100 ms
-        write(client, 792, 5000, 0, 100, 0, 20, 26)  # motion 2 of devices.md 1.5: 5 mm, smooth, after 20 ms
+        write(client, 792, 5000, 0, 100, 0, 20, 26)  # motion 2 of docs/devices.md 1.5: 5 mm, smooth, after 20 ms
         client.modbus("01 06 0003 0005")
         assert registers(client, 319) == [1 << 15]
         client.sleep(0.2)

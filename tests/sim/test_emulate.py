@@ -101,7 +101,7 @@ def test_a_terminal_outlives_its_clients() -> None:
 
 def test_pymodbus_against_another_process() -> None:
     with emulated(motor=ORCA | {"gap_us": 100}) as (paths, _):
-        # no parity: a pseudo-terminal has none, and pyserial cannot then change a setting (devices.md 5)
+        # no parity: a pseudo-terminal has none, and pyserial cannot then change a setting (docs/devices.md 5)
         client = ModbusSerialClient(paths["motor"], baudrate=115200, parity="N", timeout=10, retries=0)
         assert client.connect()
         try:

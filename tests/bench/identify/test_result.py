@@ -1,4 +1,4 @@
-"""fit.json as contracts.md fixes it."""
+"""fit.json as docs/formats.md fixes it."""
 
 from __future__ import annotations
 

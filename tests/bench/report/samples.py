@@ -116,7 +116,7 @@ def recording(rate_Hz: float = 1000.0, force_rate_Hz: float = 550.0, seed: int =
 
 
 def fit_json(**changes: Any) -> dict[str, Any]:
-    """A fit.json as contracts.md has it."""
+    """A fit.json as docs/formats.md has it."""
     return {
         "method": "continuous",
         "law": "exponential",
