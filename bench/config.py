@@ -31,7 +31,7 @@ class _Part(BaseModel):
 class Limits(_Part):
     """What must never be crossed; `position` in the motor frame, `stale` the age of data that stops a run."""
 
-    force: Positive = Field(description="N, compression, of the net force; the gross force is held to load_cell.capacity")
+    force: Positive = Field(description="N, compression, of the net force; gross is held to load_cell.capacity")
     tension: NotNegative = Field(5.0, description="N, pull")
     position: tuple[Number, Number] = Field(description="mm, motor frame: lowest, highest")
     speed: Positive = Field(description="mm/s")

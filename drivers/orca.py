@@ -38,7 +38,7 @@ from drivers.wire import Exchange, Link, Pause, Steps
 
 DEFAULT_BAUDRATE = 19200
 FAST_BAUDRATE = 625_000
-"""From here on the vendor's fast recipe applies: 80 µs between frames; below it the default, 2 ms (docs/devices.md 7.3)."""
+"""The vendor's fast recipe from here on: 80 µs between frames; below it the default, 2 ms (docs/devices.md 7.3)."""
 
 TURNAROUND_S = 0.025
 """Longest wait for the beginning of a reply: what the vendor's SDK waits for a whole one."""

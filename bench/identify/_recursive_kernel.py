@@ -324,9 +324,7 @@ def update(
     whole[TURN] += 1
     m = whole[BEST] if whole[TURN] % 2 == 0 else (whole[TURN] // 2) % B
     done = numbers[m, ACCEPTED]
-    sweep(
-        m, kind, unilateral, most, history, numbers, figures, X, gradients, matrices, H, dH, coupled, whole, bounds
-    )
+    sweep(m, kind, unilateral, most, history, numbers, figures, X, gradients, matrices, H, dH, coupled, whole, bounds)
     if numbers[m, ACCEPTED] != done:
         least = math.inf
         for j in range(B):

@@ -212,9 +212,7 @@ def _pulls(problem: Problem, noise_N: float) -> bool:
     return sum(int(np.count_nonzero((run.y < level) & (run.weight > 0))) for run in problem.runs) >= 3
 
 
-def _over(
-    problem: Problem, family: Family, order: int, unilateral: bool
-) -> tuple[Estimate, dict[str, list[float]]]:
+def _over(problem: Problem, family: Family, order: int, unilateral: bool) -> tuple[Estimate, dict[str, list[float]]]:
     """The recursion over all runs: where it ended, and its way there."""
     estimator = Recursive(family, order, problem.depth_mm, problem.force_N, unilateral)
     every = max(1, problem.size // POINTS)
@@ -245,9 +243,7 @@ def _settled(history: dict[str, list[float]]) -> bool:
     return True
 
 
-def _criterion(
-    problem: Problem, estimate: Estimate, ended: list[tuple[Estimate, dict[str, list[float]]]]
-) -> float:
+def _criterion(problem: Problem, estimate: Estimate, ended: list[tuple[Estimate, dict[str, list[float]]]]) -> float:
     best = min((e for e, _ in ended), key=lambda e: e.cost)
     n = independent_samples(problem, best.x, best.structure)
     return n * math.log(max(estimate.cost / problem.weight, 1e-12)) + estimate.structure.size * math.log(n)
@@ -256,9 +252,7 @@ def _criterion(
 def _traces(problem: Problem, estimate: Estimate) -> list[Trace]:
     simulated = objective.forces(problem, estimate.structure, estimate.x)
     out = []
-    for m, run, at, (force, _, _) in zip(
-        problem.measurements, problem.runs, problem.where, simulated, strict=True
-    ):
+    for m, run, at, (force, _, _) in zip(problem.measurements, problem.runs, problem.where, simulated, strict=True):
         counted = run.weight[at] > 0
         out.append(
             Trace(

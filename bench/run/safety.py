@@ -88,9 +88,7 @@ class Monitor:
         elif abs(sample.gross_N) > e.gross_N:
             self.violate(f"gross force {sample.gross_N:.3f} N is beyond the {e.gross_N:g} N the cell may carry")
 
-    def motor(
-        self, sample: MotorSample, command_mm: float, fault_names: tuple[str, ...], lag_mm: float = 0.0
-    ) -> None:
+    def motor(self, sample: MotorSample, command_mm: float, fault_names: tuple[str, ...], lag_mm: float = 0.0) -> None:
         """Judge one motor sample against travel, depth, speed, following error and the device's own faults.
 
         `lag_mm`: how far behind the command the axis may be because nobody knows when it began.

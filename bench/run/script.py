@@ -168,9 +168,7 @@ class Run:
             away = self._motor_frame(self.plan.start_mm)
             noise = self.found.air.sigma_N if self.found.air is not None else 0.0
             speed = self._force_speed(segment)
-            self._stiffness_N_mm = yield from press(
-                loop, mover, segment.target_N, segment.name, speed, away, noise
-            )
+            self._stiffness_N_mm = yield from press(loop, mover, segment.target_N, segment.name, speed, away, noise)
         elif segment.kind == "force_hold":
             stiffness = self._stiffness_N_mm
             yield from hold_force(loop, mover, segment.target_N, segment.duration_s, stiffness, segment.speed_mm_s)

@@ -12,7 +12,8 @@ from drivers.loadcell import ForceSample
 from drivers.wire import Link, complete
 from tests.drivers.scripted import Reply, port_of, scripted_link
 
-# docs/devices.md 3.1.1: the DAD 143 manual's worked example, whose checksum follows the rule; the sample line of the DAD 141
+# docs/devices.md 3.1.1: the DAD 143 manual's worked example, whose checksum follows the rule; the sample line of the
+# DAD 141
 # and EM 100 manuals ends in 0F, which does not.
 WORKED = b"W+000100+00110001AF"
 MISPRINT = b"W+000100+001100010F"

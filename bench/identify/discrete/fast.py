@@ -140,9 +140,7 @@ class Fast:
         ]
         bias = figures["bias_of_all_ramps"]
         if np.isfinite(bias):
-            lines.append(
-                f"By all rising ramps the law comes out {100 * bias:+.2g} % against recovered ones, at depth."
-            )
+            lines.append(f"By all rising ramps the law comes out {100 * bias:+.2g} % against recovered ones, at depth.")
         return lines
 
 
@@ -154,9 +152,7 @@ def _samples(data: Data, structure: Structure, ramps: list[list[Ramp]], which: s
             inside = (m.force_time_s >= ramp.begin_s) & (m.force_time_s <= ramp.end_s) & (depth > 0)
             inside &= m.force_time_s <= m.fit_to_s
             if inside.any():
-                pieces.append(
-                    (m.force_time_s[inside], depth[inside] / data.depth_mm, m.force_N[inside] / data.force_N)
-                )
+                pieces.append((m.force_time_s[inside], depth[inside] / data.depth_mm, m.force_N[inside] / data.force_N))
     count = sum(len(t) for t, _, _ in pieces)
     need = structure.nonlinear + 1
     if count < need:
@@ -187,8 +183,7 @@ def _static(structure: Structure, phase: _Phase) -> tuple[Solution, float]:
         starts.append((float(np.sum(error(x)[0] ** 2)), x))
     starts.sort(key=lambda item: item[0])
     ends = [
-        minimise(normal, lambda x: float(np.sum(error(x)[0] ** 2)), x, lower[:g], upper[:g], 100)
-        for _, x in starts[:2]
+        minimise(normal, lambda x: float(np.sum(error(x)[0] ** 2)), x, lower[:g], upper[:g], 100) for _, x in starts[:2]
     ]
     best = min(ends, key=lambda s: s.cost)
     return best, best.cost / max(len(phase.u) - g, 1)

@@ -40,9 +40,7 @@ class Equations:
 
 def arx(data: Data, structure: Structure, v: Array, left: list[NDArray[np.bool_]] | None = None) -> Array:
     """(α, β) by ordinary least squares with b_0 fixed, u from the γ in v. `left`: rows to leave out."""
-    systems = [
-        arx_equations(run, structure, v, None if left is None else left[j]) for j, run in enumerate(data.runs)
-    ]
+    systems = [arx_equations(run, structure, v, None if left is None else left[j]) for j, run in enumerate(data.runs)]
     target = np.concatenate([e.target[e.rows] for e in systems])
     regressors = np.concatenate([e.regressors[e.rows] for e in systems])
     return _scaled_lstsq(regressors, target)

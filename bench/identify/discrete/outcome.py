@@ -84,9 +84,7 @@ def _tried(
     return sorted(judged, key=lambda c: (not c.found.converged, c.criterion))
 
 
-def _result(
-    estimator: Estimator, data: Data, best: Candidate, candidates: list[Candidate], begun: float
-) -> FitResult:
+def _result(estimator: Estimator, data: Data, best: Candidate, candidates: list[Candidate], begun: float) -> FitResult:
     structure, found = best.structure, best.found
     unit = data.force_N**2
     traces = _traces(data, structure, found.v)
@@ -192,9 +190,7 @@ class _Reading:
                 "relaxation": {"shares": list(shares), "rates": list(rates)},
                 "contact": "unilateral" if structure.unilateral else "bonded",
                 "std": {
-                    n: p.std
-                    for n, p in self.parameters.items()
-                    if np.isfinite(p.std) and n[:2] not in ("a_", "b_")
+                    n: p.std for n, p in self.parameters.items() if np.isfinite(p.std) and n[:2] not in ("a_", "b_")
                 },
             }
         }

@@ -60,9 +60,7 @@ def over_sample_times(
             refused[time] = error.message
             continue
         V[j], physical[j] = found.V, found.physical
-        values = {
-            name: p.value for name, p in found.parameters.items() if name in LAW or name.startswith("alpha_")
-        }
+        values = {name: p.value for name, p in found.parameters.items() if name in LAW or name.startswith("alpha_")}
         if found.filter is not None:
             own = np.array([complex(*p) for p in found.filter["poles"]])
             poles[j, : len(own)] = own

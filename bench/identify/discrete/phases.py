@@ -48,9 +48,7 @@ def ramps_of(m: Measurement) -> list[Ramp]:
             continue
         i = int(np.searchsorted(t, begin, side="right")) - 1
         loaded = float(contact[max(i, 0)])
-        out.append(
-            Ramp(begin, end, float(start_mm), float(end_mm), _rested(t, x, max(i, 0), loaded, TOUCH * depth))
-        )
+        out.append(Ramp(begin, end, float(start_mm), float(end_mm), _rested(t, x, max(i, 0), loaded, TOUCH * depth)))
     return out
 
 

@@ -88,9 +88,7 @@ class Data:
             keep = run.has
             t, F = run.time_s[keep], run.y[keep] * self.force_N
             out.append(
-                Measurement(
-                    m.name, t, run.depth_mm[keep], t, F, m.fit_from_s, m.fit_to_s, m.marks, m.surface_std_mm
-                )
+                Measurement(m.name, t, run.depth_mm[keep], t, F, m.fit_from_s, m.fit_to_s, m.marks, m.surface_std_mm)
             )
         return out
 
@@ -112,9 +110,7 @@ def sampled(measurements: Sequence[Measurement], T: float | None = None) -> Data
     runs = tuple(_series(m, T, checked.depth_mm, checked.force_N) for m in checked.measurements)
     left = sum(float(run.weight.sum()) for run in runs)
     if left < FEWEST:
-        raise InputError(
-            "--sample-time", f"{T:g} s leaves {left:.0f} samples to fit", f"At least {FEWEST} are needed."
-        )
+        raise InputError("--sample-time", f"{T:g} s leaves {left:.0f} samples to fit", f"At least {FEWEST} are needed.")
     notes = list(checked.notes)
     empty = sum(int((~run.has).sum()) for run in runs)
     if empty:
