@@ -20,7 +20,7 @@ SLOWER = 8.0
 """The second approach is so many times slower than the first, for as many more samples at the surface."""
 
 BEFORE_MM = 0.1
-"""The second approach starts so far above where the first felt the pad."""
+"""The second approach starts so far above where the first found the pad."""
 
 BEYOND_MM = 0.3
 """The second approach gives up so far below where the first felt the pad."""
@@ -89,7 +89,9 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
     limit = threshold_N(approach.force, air)
     start = mover.here()
     deepest = loop.monitor.envelope.deepest_mm
+    window = mover.watch()
     found = yield from mover.go_until(deepest, approach.speed, _above(loop, limit))
+    mover.unwatch()
     if not found:
         raise Stopped(
             f"no contact: the probe went from {start:.2f} to {deepest:.2f} mm and felt less than {limit:.3f} N; "
@@ -102,9 +104,8 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
             "retract the probe (or lower the pad) and start again"
         )
     loop.sink.event(loop.clock.now(), "contact", {"position_mm": felt, "net_N": loop.last_net_N, "threshold_N": limit})
-    # The first touch was made at speed, so that the pad begins up to a stopping distance above `felt`.
-    above = max(start, felt - max(BEFORE_MM, approach.speed * 0.05))
-    yield from mover.go(above, approach.speed)
+    rough = yield from _surface_of(window, air, position_sigma_mm)
+    yield from mover.go(max(start, _second_start(felt, rough, approach.speed)), approach.speed)
     yield from loop.sleep(RECOVER_S)
     window = mover.watch()
     stop_at = max(2.0 * limit, limit + 5.0 * air.sigma_N)
@@ -130,6 +131,17 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
         },
     )
     return surface
+
+
+def _second_start(felt_mm: float, rough: Surface | None, speed_mm_s: float) -> float:
+    """Where the second approach starts: safely in air, also above a pad so soft that it was felt deep inside.
+
+    The first touch was made at speed, so that the pad begins at least up to a stopping distance above `felt_mm`;
+    `rough` is what its samples say about the surface, if they do.
+    """
+    before_mm = max(BEFORE_MM, speed_mm_s * 0.05)
+    surface_mm = felt_mm if rough is None else min(felt_mm, rough.position_mm - 2.0 * rough.std_mm)
+    return surface_mm - before_mm
 
 
 def _above(loop: Loop, limit_N: float) -> _TwoInARow:

@@ -1,4 +1,4 @@
-"""What stops a run: named, recorded once, data kept, motor safe. All in virtual time, where a stop is to the millisecond."""
+"""What stops a run: named, recorded once, data kept, motor safe. In virtual time: stops can be told to the ms."""
 
 from __future__ import annotations
 

@@ -41,19 +41,20 @@ def test_error_and_stated_deviation_agree():
 
 
 def test_known_exponent_reaches_the_bound():
-    """On a straight contact line, not knowing that it is straight costs at most a factor 3 over who knows it."""
+    """On a straight contact line, not knowing the exponent costs at most a factor 5 over who knows that it is 1."""
     rng = np.random.default_rng(5)
     x = np.linspace(0.0, 0.15, 330)
     truth, stiffness = 0.1, 2.0
     rise = np.maximum(x - truth, 0.0)
-    jacobian = np.column_stack([np.ones_like(x), rise, -stiffness * (rise > 0)])
-    bound = SIGMA_N * np.sqrt(np.linalg.inv(jacobian.T @ jacobian)[2, 2])
+    # Level, stiffness, its growth with depth (which is estimated, and is 0 here), surface.
+    jacobian = np.column_stack([np.ones_like(x), rise, rise**2, -stiffness * (rise > 0)])
+    bound = SIGMA_N * np.sqrt(np.linalg.inv(jacobian.T @ jacobian)[3, 3])
     errors = []
     for _ in range(100):
         found = find_surface(x, stiffness * rise + rng.normal(0, SIGMA_N, x.size), SIGMA_N)
         assert found is not None
         errors.append(found.position_mm - truth)
-    assert np.sqrt(np.mean(np.square(errors))) < 3 * bound
+    assert np.sqrt(np.mean(np.square(errors))) < 5 * bound
 
 
 def test_air_of_trend_and_noise():
