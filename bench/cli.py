@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import importlib
+import io
 import os
 import re
 import sys
@@ -26,6 +27,7 @@ COMMANDS = {
     "convert": "MCAP to CSV and back",
     "recover": "make a whole recording of a torn one",
     "export": "a fitted pad for other programs: C header for real-time loops, or JSON",
+    "paper": "remake the paper's figures and tables, and say what comes out of its findings",
     "schema": "print the JSON schema of a protocol, bench or model file",
     "emulate": "serve a simulated bench's devices on pseudo-terminals",
 }
@@ -90,6 +92,9 @@ def parser(command: str | None) -> tuple[Parser, Parser]:
 def main(argv: list[str] | None = None) -> int:
     """Run one command; returns the exit status of docs/formats.md."""
     words = sys.argv[1:] if argv is None else argv
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that has no ± or µ shows something else
     command = next((word for word in words if not word.startswith("-")), None)
     top, named = parser(command)
     args, unknown = top.parse_known_args(words)

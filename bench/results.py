@@ -15,6 +15,7 @@ from bench.errors import InputError
 from bench.fitview import fit_view
 from bench.modelfile import write_model
 from bench.recording import Recording, read_recording
+from bench.recording.schemas import NO_SURFACE
 from bench.report import Plan as PlannedCurve
 from bench.report import write_report
 from bench.run.folder import FIT, MODEL, REPORT
@@ -82,8 +83,13 @@ def fit_lines(fit: FitResult) -> list[str]:
     return lines
 
 
+def is_air_run(recording: Recording) -> bool:
+    """Whether there was no pad, by the protocol (`approach: none`)."""
+    return any(event.name == NO_SURFACE for event in recording.events)
+
+
 def _fit_of(recording: Recording) -> tuple[FitResult | None, str]:
-    if any(event.name == "no_surface" for event in recording.events):
+    if is_air_run(recording):
         return None, "there was no pad (air run)"
     if recording.surface_mm is None:
         stopped = recording.result is None or recording.result.get("status") != "done"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from bench.commands.options import add_columns, add_structure, must_be_writable, read_data, status
+from bench.commands.options import add_columns, add_structure, must_be_writable, pads, read_data, status
 from bench.errors import EXIT_DONE, InputError
 
 
@@ -29,7 +29,7 @@ def main(args: argparse.Namespace) -> int:
     if len(args.runs) < 2:
         raise InputError("RUN", "one run alone compares with nothing", "name two or more")
     must_be_writable(args.out)
-    measurements = [recording.measurement() for recording in read_data(args, *args.runs)]
+    measurements = pads(read_data(args, *args.runs))
     views = []
     for path, measurement in zip(args.runs, measurements, strict=True):
         with status(f"fitting {path}") as progress:

@@ -6,7 +6,7 @@ import argparse
 import json
 from pathlib import Path
 
-from bench.commands.options import add_columns, add_structure, must_be_writable, read_data, status
+from bench.commands.options import add_columns, add_structure, must_be_writable, pads, read_data, status
 from bench.errors import EXIT_DONE
 
 
@@ -37,7 +37,7 @@ def main(args: argparse.Namespace) -> int:
     for path in (args.json, args.write, args.report):
         must_be_writable(path)
     recordings = read_data(args, *args.data)
-    measurements = [recording.measurement() for recording in recordings]
+    measurements = pads(recordings)
     with status("fitting", quiet=args.json == "-") as progress:
         result = identify.fit(
             measurements,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +14,7 @@ from bench.errors import InputError
 
 if TYPE_CHECKING:
     from bench.preflight import Preflight
-    from bench.recording import Recording
+    from bench.recording import Measurement, Recording
 
 
 def add_bench(parser: argparse.ArgumentParser) -> None:
@@ -57,6 +58,17 @@ def read_data(args: argparse.Namespace, *paths: Path) -> list[Recording]:
     return [read_recording(path, columns=columns, units=units) for path in paths]
 
 
+def pads(recordings: list[Recording]) -> list[Measurement]:
+    """What a fit may see of recordings of a pad; raises `InputError` where there was none, or nothing to fit."""
+    from bench.results import is_air_run
+
+    for recording in recordings:
+        if is_air_run(recording):
+            cure = "fit a run with an approach; an air run tells of the bench alone"
+            raise InputError(str(recording.source), "was recorded in air: there is no pad in it", cure)
+    return [recording.measurement() for recording in recordings]
+
+
 def must_be_writable(path: str | Path | None) -> None:
     """Raises `InputError` where a file cannot be written: said before the work whose result is to go there."""
     if path is None or str(path) == "-":
@@ -77,6 +89,14 @@ def say_plan(preflight: Preflight) -> None:
         print(line)
     if refusal is not None:
         raise refusal
+
+
+def say(text: str) -> None:
+    """Print, or be silent from now on where nobody listens any more (the terminal was closed, a pipe ended)."""
+    try:
+        print(text, flush=True)
+    except OSError:
+        sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  # for the rest of the process
 
 
 @contextmanager

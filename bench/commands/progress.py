@@ -19,10 +19,10 @@ BAR = 24
 class Progress:
     """Redrawn in place on a terminal, silent elsewhere; a context manager that wipes its line in the end."""
 
-    def __init__(self, total_s: float, out: TextIO = sys.stderr) -> None:
+    def __init__(self, total_s: float, out: TextIO | None = None) -> None:
         self._total_s = total_s
-        self._out = out
-        self._shown = out.isatty()
+        self._out = sys.stderr if out is None else out
+        self._shown = self._out.isatty()
         self._next_s = 0.0
 
     def tell(self, bench_s: float, label: str) -> None:
@@ -44,7 +44,10 @@ class Progress:
             self._draw("")
 
     def _draw(self, text: str) -> None:
-        if select.select([], [self._out], [], 0.0)[1]:
-            columns = shutil.get_terminal_size().columns
-            self._out.write(f"\r\x1b[K{text[: columns - 1]}")
-            self._out.flush()
+        try:
+            if select.select([], [self._out], [], 0.0)[1]:
+                columns = shutil.get_terminal_size().columns
+                self._out.write(f"\r\x1b[K{text[: columns - 1]}")
+                self._out.flush()
+        except (OSError, ValueError):
+            self._shown = False  # the terminal is gone: that is no reason to stop a motor in mid-air

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.commands.options import add_bench, say_plan, status
+from bench.commands.options import add_bench, say, say_plan, status
 from bench.commands.progress import Progress
 from bench.errors import EXIT_DONE, EXIT_NO, InputError, Refused
 
@@ -83,22 +83,22 @@ def _after(outcome: Outcome, prediction: Prediction) -> None:
     with status("fitting the pad's model"):
         results = analyse(outcome.folder, prediction=prediction)
     for line in results.lines():
-        print(line)
-    print(f"report: {results.report}")
+        say(line)
+    say(f"report: {results.report}")
 
 
 def _say_outcome(outcome: Outcome, bench: Bench, wall_s: float) -> None:
     what = "simulated " if bench.all_simulated else ""
     speed = f" ({outcome.bench_seconds / wall_s:.0f} times real time)" if bench.all_simulated and wall_s > 0 else ""
-    print(
+    say(
         f"{what}run: {outcome.bench_seconds:.1f} s of bench time in {wall_s:.1f} s{speed}, "
         f"{outcome.motor_samples} motor and {outcome.force_samples} force samples"
     )
     found = outcome.findings
     if found.surface is not None:
         s = found.surface
-        print(f"surface: {s.position_mm:.4f} mm ± {1e3 * s.std_mm:.1f} µm (motor frame)")
+        say(f"surface: {s.position_mm:.4f} mm ± {1e3 * s.std_mm:.1f} µm (motor frame)")
     if outcome.cause is not None:
-        print(f"STOPPED: {outcome.cause}\n  what was measured until then is kept in {outcome.folder}")
+        say(f"STOPPED: {outcome.cause}\n  what was measured until then is kept in {outcome.folder}")
     if found.not_safe:
-        print(f"NOT SAFE: the motor's safe state could not be read back: {found.not_safe}\n  use the emergency stop")
+        say(f"NOT SAFE: the motor's safe state could not be read back: {found.not_safe}\n  use the emergency stop")

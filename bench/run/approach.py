@@ -25,8 +25,12 @@ BEFORE_MM = 0.1
 BEYOND_MM = 0.3
 """The second approach gives up so far below where the first felt the pad."""
 
-RECOVER_S = 0.5
-"""Rest between the two approaches, so that the first touch relaxes."""
+RECOVER_S, RECOVER_TIMES = 0.5, 5.0
+"""Rest between two approaches, so that the last touch relaxes: at least so long, and so many times as long as it
+lasted. What has not relaxed keeps the surface lower than it was."""
+
+MOST_PASSES = 4
+"""The slow approach is repeated from further above, twice as long each time, where it began too near or in the pad."""
 
 
 def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float) -> Script[Air]:
@@ -105,14 +109,17 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
         )
     loop.sink.event(loop.clock.now(), "contact", {"position_mm": felt, "net_N": loop.last_net_N, "threshold_N": limit})
     rough = yield from _surface_of(window, air, position_sigma_mm)
-    yield from mover.go(max(start, _second_start(felt, rough, approach.speed)), approach.speed)
-    yield from loop.sleep(RECOVER_S)
-    window = mover.watch()
-    stop_at = max(2.0 * limit, limit + 5.0 * air.sigma_N)
-    yield from mover.go_until(min(felt + BEYOND_MM, deepest), approach.speed / SLOWER, _above(loop, stop_at))
-    yield from loop.sleep(0.02)
-    mover.unwatch()
-    surface = yield from _surface_of(window, air, position_sigma_mm)
+    begin = max(start, _in_air_mm(felt, rough, approach))
+    rest_s = RECOVER_S
+    for _ in range(MOST_PASSES):
+        yield from mover.go(begin, approach.speed)
+        yield from loop.sleep(rest_s)
+        surface = yield from _slow_approach(loop, mover, approach, air, felt, position_sigma_mm)
+        reached = mover.here()
+        if begin <= start or (surface is not None and _enough_air(surface, begin, reached)):
+            break
+        rest_s = max(RECOVER_S, RECOVER_TIMES * (reached - begin) * SLOWER / approach.speed)
+        begin = max(start, begin - max(BEFORE_MM, reached - begin))
     if surface is None:
         raise Stopped(
             f"the surface could not be measured: fewer than {MIN_SAMPLES_IN_CONTACT} samples of the slow approach "
@@ -133,15 +140,38 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
     return surface
 
 
-def _second_start(felt_mm: float, rough: Surface | None, speed_mm_s: float) -> float:
-    """Where the second approach starts: safely in air, also above a pad so soft that it was felt deep inside.
+def _slow_approach(
+    loop: Loop, mover: Mover, approach: Approach, air: Air, felt_mm: float, position_sigma_mm: float
+) -> Script[Surface | None]:
+    """From here slowly until the pad is felt a little harder than before; what the samples say of its surface."""
+    limit = threshold_N(approach.force, air)
+    window = mover.watch()
+    stop_at = max(2.0 * limit, limit + 5.0 * air.sigma_N)
+    end = min(felt_mm + BEYOND_MM, loop.monitor.envelope.deepest_mm)
+    yield from mover.go_until(end, approach.speed / SLOWER, _above(loop, stop_at))
+    yield from loop.sleep(0.02)
+    mover.unwatch()
+    return (yield from _surface_of(window, air, position_sigma_mm))
 
-    The first touch was made at speed, so that the pad begins at least up to a stopping distance above `felt_mm`;
-    `rough` is what its samples say about the surface, if they do.
+
+def _in_air_mm(felt_mm: float, rough: Surface | None, approach: Approach) -> float:
+    """Where the slow approach may start: `rough` is what the first one's few samples say about the surface.
+
+    The first touch was made at speed, so that the pad begins at least up to a stopping distance above `felt_mm`.
     """
-    before_mm = max(BEFORE_MM, speed_mm_s * 0.05)
-    surface_mm = felt_mm if rough is None else min(felt_mm, rough.position_mm - 2.0 * rough.std_mm)
-    return surface_mm - before_mm
+    before_mm = max(BEFORE_MM, approach.speed * 0.05)
+    if rough is None or rough.std_mm > BEFORE_MM:
+        return felt_mm - max(before_mm, approach.retract)
+    return min(felt_mm, rough.position_mm - 2.0 * rough.std_mm) - before_mm
+
+
+def _enough_air(surface: Surface, begin_mm: float, reached_mm: float) -> bool:
+    """Whether an approach came through as much air as pad, for certain.
+
+    One that begins inside the pad takes the force there for its level in air, and finds a surface that is none. A pad
+    that is soft at first is felt so far below its surface that this happens.
+    """
+    return surface.position_mm - 2.0 * surface.std_mm - begin_mm >= reached_mm - surface.position_mm
 
 
 def _above(loop: Loop, limit_N: float) -> _TwoInARow:

@@ -297,6 +297,7 @@ class Run:
             if self.clock.now() > give_up:
                 return
             yield
+        yield from self.mover.settle()  # the plan is over before an axis that lags is
 
     def _clamps(self) -> MotorLimits:
         limits = self.bench.limits

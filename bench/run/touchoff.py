@@ -24,9 +24,6 @@ SIGMAS = 5.0
 
 MIN_SAMPLES_IN_CONTACT = 4
 
-PIECE = 8
-"""So many least-squares fits between two looks at the motor."""
-
 
 @dataclass(frozen=True)
 class Air:
@@ -144,12 +141,8 @@ def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Gene
     lo, hi = float(x.min()), float(x.max()) - 1e-6 * span
     for _ in range(4):
         grid = np.linspace(lo, hi, 41)
-        cost = np.empty(grid.size)
-        for i, x0 in enumerate(grid):
-            cost[i] = _cost(x, force, float(x0), exponent)[0]
-            if i % PIECE == PIECE - 1:
-                yield
-        best = int(np.argmin(cost))
+        best = int(np.argmin(_costs(x, force, grid, exponent)))
+        yield
         lo, hi = grid[max(best - 2, 0)], grid[min(best + 2, grid.size - 1)]
     x0 = float(grid[best])
     if (x > x0).sum() < MIN_SAMPLES_IN_CONTACT:
@@ -171,6 +164,24 @@ def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Gene
         return None
     std = float(np.sqrt(max(covariance[3, 3], 0.0))) / scale[3]
     return _Fit(x0, std, chi2 / sigma**2, exponent, gain * depth**exponent + bend * depth ** (exponent + 1.0))
+
+
+def _costs(x: Array, force: Array, x0: Array, exponent: float) -> Array:
+    """Sums of squares left by the best level, k and k' for each surface of x0 (m,); shape of x and force (n,)."""
+    r = np.maximum(x - x0[:, None], 0.0) / np.ptp(x)
+    a = r**exponent
+    b = a * r
+    a -= a.mean(axis=1, keepdims=True)
+    b -= b.mean(axis=1, keepdims=True)
+    f = force - force.mean()
+    aa, ab, bb = (a * a).sum(axis=1), (a * b).sum(axis=1), (b * b).sum(axis=1)
+    af, bf = a @ f, b @ f
+    det = aa * bb - ab * ab
+    # Where too little is in contact for both of them, one has to do; where nothing is, none.
+    both = det > 1e-12 * aa * bb
+    one = np.divide(af * af, aa, out=np.zeros_like(aa), where=aa > 0)
+    two = np.divide(bb * af * af - 2 * ab * af * bf + aa * bf * bf, det, out=np.zeros_like(aa), where=both)
+    return np.asarray(f @ f - np.where(both, two, one))
 
 
 def _cost(x: Array, force: Array, x0: float, exponent: float) -> tuple[float, Array]:

@@ -88,7 +88,7 @@ def test_numbers_as_names_of_samples() -> None:
         (steps("{to: 1}"), "p.yaml:3:5", "steps[0].speed: is missing"),
         (steps("{to: 1, speed: 1, hold: -1}"), "p.yaml:3:29", "steps[0].hold: must be ≥ 0, not -1"),
         (steps("{to: 1, speed: 1, hlod: 1}"), "p.yaml:3:23", "steps[0].hlod: unknown key"),
-        (steps("{to: 1, to_force: 1, speed: 1}"), "p.yaml:3:13", "steps[0].to_force: unknown key"),
+        (steps("{to: 1, to_force: 1, speed: 1}"), "p.yaml:3:5", "a step has one of `to` (a depth)"),
         (steps("{speed: 1}"), "p.yaml:3:5", "a step has one of `to` (a depth)"),
         (steps("rest"), "p.yaml:3:5", "a step has one of `to` (a depth)"),
         (steps("{to_force: -1, speed: 1}"), "p.yaml:3:16", "steps[0].to_force: must be > 0, not -1"),

@@ -20,8 +20,9 @@ def test_a_port_of_nothing_says_what_there_is() -> None:
         for url in ("sim://here/pump", "sim://elsewhere/motor", "sim://here"):
             with pytest.raises(serial.SerialException, match="sim://here/load_cell"):
                 serial.serial_for_url(url)
-    with pytest.raises(serial.SerialException, match="none"):
+    with pytest.raises(serial.SerialException, match="there is no simulated device") as caught:
         serial.serial_for_url("sim://here/motor")
+    assert "sim://here/" not in str(caught.value).partition("there are")[2], "a world that is gone is not offered"
 
 
 def test_reading_with_a_time_out_moves_virtual_time() -> None:

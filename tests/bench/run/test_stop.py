@@ -52,7 +52,7 @@ def stopped_well(done: Done, cause: str) -> None:
 
 @BOTH
 def test_too_much_force_in_mid_motion(tmp_path, base):
-    gently = {"approach": {"speed": 1}, "limits": {"force": 2}}
+    gently = {"approach": {"speed": 1}, "limits": {"force": 2}, "steps": [{"to": 2.0, "speed": 20, "hold": 1.0}]}
     done = run(tmp_path, merged(DEEP, gently), base, simulation={"surface": 0.6})
     stopped_well(done, r"^force limit: 2\.\d+ N measured, 2 N allowed$")
     limits, law = done.bench.limits, done.truth.pad.law
