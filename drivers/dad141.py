@@ -2,8 +2,8 @@
 
 The combined string is used in both, since it alone carries a checksum. Nothing is set up in the device: it is asked
 how it is set. Facts: docs/devices.md 3.1 and 3.1.1. Not confirmed there, and treated so: the terminator of replies (CR
-and CR LF are both taken), `ERR` as the text of a refusal, and what the strings show beyond the range (a full display, or
-no number under a good checksum, counts as overload).
+and CR LF are both taken), `ERR` as the text of a refusal, and what the strings show beyond the range (a full display,
+or no number under a good checksum, counts as overload).
 """
 
 from __future__ import annotations

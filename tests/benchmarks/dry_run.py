@@ -23,7 +23,7 @@ HOW = """
 The shipped `staircase` on the shipped bench `simulated`, as `padbench run` runs it: real drivers, simulated devices
 behind `sim://` ports with their time on the wire, 1 kHz position stream, limits, recording to MCAP; virtual time. From
 opening the ports to the closed recording; preflight before and fit after are not in it. Bench seconds per second of
-processor time stand beside those per second of wall time, since other programs on the machine slow down only the latter.
+processor time stand beside those per second of wall time, since other programs slow down only the latter.
 """
 
 

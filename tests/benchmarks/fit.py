@@ -68,9 +68,7 @@ def run() -> Section:
         found = f"{result.law}, r = {result.order}, {result.contact}"
         table.rows.append((name, middle(wall, "{:.2f}"), middle(processor, "{:.2f}"), found, _errors(result)))
     reached = medians[1]
-    goal = Goal(
-        "fit of 30,000 samples, r = 2, law given", f"< {WANTED_S:g} s", f"{reached:.2f} s", reached < WANTED_S
-    )
+    goal = Goal("fit of 30,000 samples, r = 2, law given", f"< {WANTED_S:g} s", f"{reached:.2f} s", reached < WANTED_S)
     return Section(TITLE, HOW, [table], [goal], time.perf_counter() - started)
 
 

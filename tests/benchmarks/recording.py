@@ -14,8 +14,8 @@ from mcap.reader import make_reader
 from bench.recording import Recorder, Recording, StepMark, read_recording
 from bench.recording.store import InlineStore
 from drivers.clock import WallClock
-from tests.benchmarks.report import Section, Table, middle
 from tests.bench.recording.made import StillClock
+from tests.benchmarks.report import Section, Table, middle
 
 TITLE = "Recording"
 ROUNDS = 5
@@ -120,7 +120,12 @@ def costs(folder: Path) -> Table:
         assert len(recording.motor.time_s) + len(recording.load_cell.time_s) == samples
         read.append(1e6 * seconds / samples)
         library.append(1e6 * _read_by_library(path) / samples)
-    table = Table((f"{samples:,} samples, {path.stat().st_size / samples:.0f} bytes each on disk", "µs of processor time a sample"))
+    table = Table(
+        (
+            f"{samples:,} samples, {path.stat().st_size / samples:.0f} bytes each on disk",
+            "µs of processor time a sample",
+        )
+    )
     table.rows += [
         ("recorded", middle(write, "{:.2f}")),
         ("read to arrays", middle(read, "{:.2f}")),

@@ -80,11 +80,7 @@ def test_the_result_keeps_the_form(method, order):
     if f.physical:
         poles = np.exp(-np.array(pad.relaxation.rates) * 0.01)
         real = sorted((p[0] for p in out["filter"]["poles"]), reverse=True)
-        assert (
-            len(poles) == 0
-            or np.allclose(sorted(poles, reverse=True), real[: len(poles)], atol=1e-6)
-            or order == 3
-        )
+        assert len(poles) == 0 or np.allclose(sorted(poles, reverse=True), real[: len(poles)], atol=1e-6) or order == 3
         assert min(pad.relaxation.shares, default=1.0) >= 0 and sum(pad.relaxation.shares) <= 1 + 1e-9
     else:
         assert list(pad.relaxation.shares) == [] and {"a_1", "b_1"} <= set(out["parameters"])

@@ -69,9 +69,7 @@ def test_the_mean_of_the_elastic_force_is_taken_behind_the_law():
 def test_gaps_and_history_do_not_count():
     m = exact(0, 200, 0.0)
     keep = np.abs(m.force_time_s - 5.0) > 0.6
-    holey = Measurement(
-        "gap", m.position_time_s, m.position_mm, m.force_time_s[keep], m.force_N[keep], fit_from_s=2.0
-    )
+    holey = Measurement("gap", m.position_time_s, m.position_mm, m.force_time_s[keep], m.force_N[keep], fit_from_s=2.0)
     data = sampled([holey], T)
     run = data.runs[0]
     assert (~run.has).sum() == np.sum(~keep) and np.all(run.weight[run.time_s < 1.99] == 0)
@@ -147,8 +145,6 @@ def test_a_pad_recovers_with_rest(rest_s, recovered):
     from tests.truth.motion import Path
     from tests.truth.noise import Noise
 
-    path = (
-        Path(-0.5).hold(0.5).to(1.0, 80.0).hold(1.0).to(-0.5, 80.0).hold(rest_s).to(1.0, 80.0).hold(1.0).motion()
-    )
+    path = Path(-0.5).hold(0.5).to(1.0, 80.0).hold(1.0).to(-0.5, 80.0).hold(rest_s).to(1.0, 80.0).hold(1.0).motion()
     m = measurement(make(GEL, path, 200.0, Noise(None), np.random.default_rng(0)))
     assert [r.recovered for r in phases.ramps_of(m) if r.rising] == [True, recovered]

@@ -45,9 +45,7 @@ def test_the_compiled_law_is_the_laws_own(family):
         s, ds = family.shape(depths, np.asarray(theta))
         for n, u in enumerate(depths.tolist()):
             slope = np.empty(family.size)
-            assert kernel.law_value(kind, u, np.asarray(theta, dtype=float), slope) == pytest.approx(
-                s[n], abs=1e-9
-            )
+            assert kernel.law_value(kind, u, np.asarray(theta, dtype=float), slope) == pytest.approx(s[n], abs=1e-9)
             assert np.allclose(slope, ds[n], atol=1e-6)
 
 
