@@ -184,6 +184,14 @@ class Axis:
 
     # -- the bytes ---------------------------------------------------------------------------------------------
 
+    def catch_up(self, now_s: float) -> None:
+        """To be called first in each turn: where the host was late by more than a period, the profile waited for it."""
+        late = now_s - self._next_s
+        if self.live and late > self.period_s and self.motor.kind == "stream":
+            self.overruns += 1
+            self._put_off(late)
+            self._next_s = now_s
+
     def tick(self, now_s: float) -> None:
         """Submit what is due: the next command or poll, and the next exchange of a running move."""
         if self._steps is not None:
@@ -193,6 +201,7 @@ class Axis:
         if len(self._waiting) > 1:
             # The last command is still unanswered a whole period later: skip this one, and say so.
             self.overruns += 1
+            self._put_off(now_s + self.period_s - self._next_s)
             self._next_s = now_s + self.period_s
             return
         if self.motor.kind == "stream":
@@ -206,6 +215,11 @@ class Axis:
             self._next_s = now_s + self.period_s
         else:
             self._next_s += self.period_s
+
+    def _put_off(self, seconds: float) -> None:
+        """Let a streamed profile go on where it was, so much later: a set-point that jumps is a blow to the pad."""
+        if self.motor.kind == "stream":
+            self._start_s += seconds
 
     def collect(self) -> list[tuple[MotorSample, float]]:
         """Samples that have come, each with the position commanded when it was measured; errors go to `failures`."""

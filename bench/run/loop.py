@@ -118,6 +118,7 @@ class Loop:
             for link, link_due_s in zip(links, due_s, strict=True):
                 if link_due_s <= now or link.port in ready:
                     link.service()
+            axis.catch_up(now)
             self._take(now)
             self.monitor.check()
             try:

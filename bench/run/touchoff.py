@@ -162,7 +162,8 @@ def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Gene
         covariance = np.linalg.inv(normal) * sigma**2
     except np.linalg.LinAlgError:
         return None
-    std = float(np.sqrt(max(covariance[3, 3], 0.0))) / scale[3]
+    # Where the data say nothing, still: somewhere within the approach, anywhere alike.
+    std = min(float(np.sqrt(max(covariance[3, 3], 0.0))) / scale[3], span / np.sqrt(12.0))
     return _Fit(x0, std, chi2 / sigma**2, exponent, gain * depth**exponent + bend * depth ** (exponent + 1.0))
 
 

@@ -54,6 +54,7 @@ CASES = (
     Case(20, drift_N_s=0.002),
     Case(20, pad="silicone", noise_N=0.02, drift_N_s=-0.002),
     Case(20, pad="power"),
+    Case(20, pad="power", noise_N=0.02),
     Case(20, bench="simulated_iai"),
     Case(20, bench="simulated_modbus"),
 )

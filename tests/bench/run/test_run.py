@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.bench.run.benches import SHORT, Done, merged, run
+from tests.bench.run.benches import SHORT, Done, merged, once, run
 
 STILL_S = 0.2
 BY_FORCE = {
@@ -250,6 +250,32 @@ def test_preconditioning_and_blocks_come_in_their_order(tmp_path):
     assert names == ["tare", "approach", "precondition[0]", "precondition[1]", "precondition", *turns, "finish"]
     measurement = done.recording.measurement()
     assert measurement.fit_from_s == next(m.time_s for m in done.recording.steps if m.phase == "steps")
+
+
+@pytest.mark.parametrize("stall_s", [0.004, 0.03])
+def test_a_host_that_is_late_strikes_no_blow(tmp_path, stall_s):
+    """The profile goes on where it was when the host comes back, and not where it would be by now."""
+    began: list[float] = []
+
+    def in_mid_ramp(bench_s: float, label: str) -> bool:
+        if label == "steps[0]":
+            began.append(bench_s)
+        return bool(began) and bench_s > began[0] + 0.02
+
+    def stall(world, bench_s):
+        world.clock.wait([], world.clock.now() + stall_s)
+
+    steps = [{"to": 1.5, "speed": 60, "hold": 0.3}]
+    done = run(tmp_path, merged(SHORT, {"steps": steps}), hook=once(in_mid_ramp, stall))
+    assert done.outcome.cause is None, done.outcome.cause
+    assert int(done.result["overruns"]) >= 1
+    ramp, end = next((m, e) for m, e in done.stretches() if m.name == "steps[0]")
+    motor = done.recording.motor
+    inside = (motor.time_s >= ramp.time_s) & (motor.time_s < end)
+    assert np.diff(motor.command_mm[inside]).max() < 2.1 * 60e-3
+    assert np.diff(motor.time_s[inside]).max() > 0.9 * stall_s, "there was a stall"
+    hold, end = next((m, e) for m, e in done.stretches() if m.kind == "hold")
+    assert done.depth(end - 0.1, end).mean() == pytest.approx(1.5, abs=3e-3), "and it arrives all the same"
 
 
 def test_the_folder_holds_the_recording_alone_until_something_is_made_of_it(tmp_path):
