@@ -24,6 +24,9 @@ from drivers.port import raw_io
 
 T = TypeVar("T")
 
+BEFORE_REPLY_S = 0.0001
+"""On a clock that watches, a link is looked at so long before a reply is due, judging by those before."""
+
 QUIET_AFTER_FAULT_S = 0.002
 """Silence that must pass after a timeout or a broken frame before the next request, so that a late reply
 is thrown away and not taken for the next answer."""
@@ -156,6 +159,9 @@ class Link:
         self._current: Exchange[Any] | None = None
         self._buffer = bytearray()
         self._deadline_s = 0.0
+        self._due_s = 0.0
+        self._usual_s: dict[str, float] = {}
+        self._watches = bool(getattr(clock, "watches", False))
         self._free_at_s = 0.0
         self._quiet_limit_s = 0.0
         self._check_at_s = 0.0
@@ -193,7 +199,7 @@ class Link:
     def wake_at(self) -> float:
         """When `service` must be called although no byte came (bench clock); infinity if never."""
         if self._current is not None:
-            return self._deadline_s
+            return self._due_s if self._watches and self.clock.now() < self._due_s else self._deadline_s
         return self._free_at_s if self._queue else float("inf")
 
     def service(self) -> None:
@@ -267,6 +273,10 @@ class Link:
     def _finish(self, exchange: Exchange[Any], now: float) -> None:
         exchange.received_s = now
         exchange.done = True
+        took_s = now - exchange.sent_s
+        usual_s = self._usual_s.get(exchange.name, took_s)
+        # The shortest of late, forgotten slowly: one late reply must not have the next one looked for too late.
+        self._usual_s[exchange.name] = took_s if took_s < usual_s else usual_s + 0.02 * (took_s - usual_s)
         self.traffic.exchanges += 1
         self._current = None
         self._buffer.clear()
@@ -315,6 +325,7 @@ class Link:
         self._quiet_limit_s = 0.0
         self._buffer.clear()
         self._deadline_s = now + exchange.timeout_s + self.wire_s(len(exchange.request))
+        self._due_s = now + self._usual_s.get(exchange.name, 0.0) - BEFORE_REPLY_S
 
     def _timeout_message(self, exchange: Exchange[Any]) -> str:
         got = f", only {len(self._buffer)} bytes" if self._buffer else ""

@@ -2,18 +2,23 @@
 
 A pseudo-terminal passes bytes at once and knows neither baudrate nor parity, so the line keeps the wire time here:
 a request counts as arrived when its last byte would have crossed a real wire, and a reply is handed over when its
-last byte would have. What a process wakes up late is the error: with an idle core some 30 to 50 µs an exchange.
-(Polling for the next request instead of sleeping was tried: on a busy machine the scheduler makes it pay for that
-with milliseconds.)
+last byte would have. On a real wire the first bit leaves when the client writes; here the bytes are seen some 30 µs
+later, when kernel and scheduler have passed them on. Each terminal measures that once, at its start, and takes it
+for part of the request's time on the wire. What remains is the reply's way through the terminal, which a serial
+port's driver has too. (Polling for the next request instead of sleeping was tried: on a busy machine the scheduler
+makes it pay for that with milliseconds.)
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import select
 import signal
 import socket
+import statistics
 import sys
+import time
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol, TextIO
 
@@ -22,6 +27,9 @@ from sim.line import Line
 from sim.world import Endpoint, World, WorldSettings
 
 LOOK_UP_S = 0.2
+
+LONGEST_WAY_S = 1e-4
+"""More than that a terminal is not believed to take: something else had the processor."""
 
 
 class _Outlet(Protocol):
@@ -47,13 +55,15 @@ class PtyOutlet:
         tty.setraw(self._slave)  # held open: the terminal outlives its clients
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
+        self._late_s = way_through_s(self._slave, self._master)
         self._line = line
         line.sink = self._deliver
 
     def _deliver(self, data: bytes) -> None:
-        # With nobody reading, the terminal's buffer fills up; a real line would lose the bytes as well.
-        with contextlib.suppress(BlockingIOError):
+        try:  # noqa: SIM105  # a context manager takes longer, and somebody waits for these bytes
             os.write(self._master, data)
+        except BlockingIOError:
+            pass  # with nobody reading, the terminal's buffer fills up; a real line would lose the bytes as well
 
     def fileno(self) -> int:
         """Descriptor to wait on."""
@@ -61,14 +71,30 @@ class PtyOutlet:
 
     def pump(self) -> None:
         """Pass on what the client has written."""
-        with contextlib.suppress(BlockingIOError):
-            self._line.host_write(os.read(self._master, 4096))
+        try:
+            data = os.read(self._master, 4096)
+        except BlockingIOError:
+            return
+        self._line.host_write(data, self._late_s)
 
     def close(self) -> None:
         """Take the terminal away."""
         self._line.sink = None
         os.close(self._master)
         os.close(self._slave)
+
+
+def way_through_s(slave: int, master: int, tries: int = 15) -> float:
+    """How long bytes written at one end of a raw terminal take until a sleeper at the other has them, by the median."""
+    spans = []
+    for _ in range(tries):
+        time.sleep(0.001)
+        start_s = time.perf_counter()
+        os.write(slave, bytes(9))
+        select.select([master], [], [], 0.1)
+        spans.append(time.perf_counter() - start_s)
+        os.read(master, 4096)
+    return min(statistics.median(spans), LONGEST_WAY_S)
 
 
 class TcpOutlet:

@@ -100,11 +100,11 @@ class Line:
 
     # -- host to device ----------------------------------------------------------------------------------------
 
-    def host_write(self, data: bytes) -> None:
-        """Put bytes on the wire now, behind those that are still leaving."""
+    def host_write(self, data: bytes, late_s: float = 0.0) -> None:
+        """Put bytes on the wire now (so long ago as they come `late_s`), behind those that are still leaving."""
         if not data:
             return
-        now_s = self.clock.now()
+        now_s = self.clock.now() - late_s
         start_s = self._to_device_free_s if self._to_device_free_s > now_s else now_s
         end_s = start_s + len(data) * self.host_byte_s
         self._to_device_start_s = start_s
@@ -142,9 +142,10 @@ class Line:
         return end_s
 
     def _delivered(self, at_s: float) -> None:
-        self.clock.arrived()
         if self.sink is not None:
-            self.sink(self._take(1 << 30, at_s))
+            self.sink(self._to_host.popleft().data)  # whole, and in its turn: nothing else takes from such a line
+            return
+        self.clock.arrived()
 
     def available(self) -> int:
         """Bytes that have arrived at the host and were not read yet."""
