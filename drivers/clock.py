@@ -29,7 +29,7 @@ class WallClock:
     """
 
     watches = True
-    """Waits begin wide awake: a link asks to be looked at just before its reply is due (`drivers.wire.Link.wake_at`)."""
+    """Waits begin wide awake: a link asks to be looked at just before its reply is due (`Link.wake_at`)."""
 
     def __init__(self) -> None:
         self._start_s = time.perf_counter()
