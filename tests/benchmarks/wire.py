@@ -49,11 +49,12 @@ in the same run, at ordinary priority: {ROUNDS} rounds of {EXCHANGES} exchanges 
 synchronous client with a custom PDU, which polls with sleeps and so has a floor of 2 ms whatever the baudrate).
 
 What a request takes through the terminal is an artefact of the emulation: on a real wire its first bit leaves with the
-write. The emulator measures it at its start and counts it as wire time already passed ({{way}} µs, measured here in
-the same way); a reply's way through the terminal is not counted so: a serial port's driver has that too. "On the line"
-is from the write of the request to having read the reply's last byte, "call" adds the client's own work before and
-after: frame built, reply checked and decoded. That work is some 10 µs on a processor that has just done the same, and
-several times that after milliseconds of idling, on a virtual machine above all.
+write. The emulator measures at its start what it takes at the least, and counts that as wire time already passed
+({{way}} µs, measured here in the same way: add it to have the figures without). A reply's way through the terminal is
+not counted so: a serial port's driver has that too. "On the line" is from the write of the request to having read the
+reply's last byte, "call" adds the client's own work before and after: frame built, reply checked and decoded. That
+work is some 10 µs on a processor that has just done the same, and several times that after milliseconds of idling, on
+a virtual machine above all.
 """
 
 
