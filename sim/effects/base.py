@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     from sim.pad import Pad
 
 Array = NDArray[np.float64]
+
+Floor = Literal["sample_s", "position_noise_mm", "force_noise_N"]
+"""A quantity of the data: the time between force samples, or the standard deviation of a channel's noise."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,24 @@ class Parameter:
     required: bool = False
     default: float | None = None
     """Value when a file leaves it out; `typical` where None."""
+    starts: tuple[float, ...] = ()
+    """Values from which fits of a shape start (time constants, periods, phases …); `typical` alone where empty."""
+    amplitude: bool = False
+    """The number that switches the effect off at 0; where lower < 0 its sign is part of the effect."""
+    floor: tuple[Floor, float] | None = None
+    """(a quantity of the data, factor): a value nearer to 0 than their product cannot be believed."""
+    fixed: bool = False
+    """A choice of form, not fitted: it stays at the value given, or at its default."""
+
+    def __post_init__(self) -> None:
+        outside = [value for value in (*self.starts, self.if_left_out) if not self.lower <= value <= self.upper]
+        if outside:
+            raise ValueError(f"{self.name}: {outside[0]:g} is not from {self.lower:g} to {self.upper:g}")
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether a fit works on the parameter's logarithm: wherever it is above 0 by nature."""
+        return self.lower > 0.0
 
     @property
     def if_left_out(self) -> float:
@@ -95,6 +116,16 @@ class Effect:
     id: str
     what: str
     forms: tuple[Form, ...]
+    says: str = ""
+    """A sentence for whoever runs the bench, with the parameters of the first form as `{name}` fields."""
+    check: str = ""
+    """What to look at on the bench."""
+    reference: str = ""
+    """Where the physics stands in the literature."""
+
+    def explanation(self, values: Mapping[str, float]) -> str:
+        """`says` with numbers in it; `what` where the effect has no such sentence."""
+        return self.says.format(**values) if self.says else self.what
 
     def form(self, name: str | None = None) -> Form:
         """The form `name`, or the first; KeyError when there is none of that name."""
@@ -104,6 +135,18 @@ class Effect:
             if form.name == name:
                 return form
         raise KeyError(name)
+
+    def active(self, form: str | None = None, **values: float) -> Active:
+        """The effect with numbers; parameters left out take their defaults, required ones their typical value.
+
+        Raises KeyError for a form or a parameter that there is not.
+        """
+        chosen = self.form(form)
+        unknown = set(values) - {parameter.name for parameter in chosen.parameters}
+        if unknown:
+            raise KeyError(sorted(unknown)[0])
+        numbers = {parameter.name: values.get(parameter.name, parameter.if_left_out) for parameter in chosen.parameters}
+        return Active(self, chosen, numbers)
 
 
 @dataclass(frozen=True)

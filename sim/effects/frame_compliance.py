@@ -3,6 +3,11 @@
 The motor side moves by x, the probe by y = x − C F. With a linear pad of stiffness K the bench sees K/(1 + C K) instead
 of K. The force used is the one at the cell, solved within the step (sim/kernel.py), never the last step's.
 
+- `linear`: C F.
+- `stiffening`: C F/(1 + |F|/stiffening_force): joints that bed in under load, to C · stiffening_force at most.
+- `power`: C F (1 + (F/1 N)²)^((n−1)/2): linear at small forces and |F|^n at large ones. Hertz's contact of probe
+  and seat has n = 2/3 (K. L. Johnson, Contact Mechanics, Cambridge, 1985, chapter 4).
+
 Reference: W. C. Oliver, G. M. Pharr, J. Mater. Res. 7, 1992, 1564–1583: the compliance measured is that of the
 contact plus that of the load frame.
 """
@@ -19,25 +24,54 @@ def spring(dt: float, force: float, state: State, p: State) -> float:
     return p[0] * force
 
 
+@block
+def stiffening(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection in mm; p = (compliance, stiffening_force)."""
+    return p[0] * force / (1.0 + abs(force) / p[1])
+
+
+@block
+def power(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection in mm; p = (compliance, exponent)."""
+    return float(p[0] * force * (1.0 + force * force) ** (0.5 * (p[1] - 1.0)))
+
+
+def _compliance(what: str) -> Parameter:
+    return Parameter("compliance", "mm/N", 0.0, 1.0, 0.005, what, required=True, amplitude=True, starts=(0.005, 0.03))
+
+
 EFFECT = Effect(
     id="frame_compliance",
     what="Frame, load cell and probe give way under force like a spring in series with the pad.",
+    says="frame, cell and probe give {compliance:.4g} mm per N",
+    check="clamp the frame, shorten the lever arm, stiffen the probe holder; press on something hard to measure it",
+    reference="Oliver, Pharr, J. Mater. Res. 7, 1992, 1564-1583",
     forms=(
         Form(
             name="linear",
             what="deflection proportional to the force at the cell",
+            parameters=(_compliance("deflection per newton"),),
+            blocks={"frame": spring},
+        ),
+        Form(
+            name="stiffening",
+            what="ever stiffer with the force",
             parameters=(
+                _compliance("deflection per newton at small forces"),
                 Parameter(
-                    "compliance",
-                    "mm/N",
-                    0.0,
-                    1.0,
-                    0.005,
-                    "deflection per newton",
-                    required=True,
+                    "stiffening_force", "N", 1e-2, 1e4, 5.0, "force at which the deflection is half", starts=(2.0, 20.0)
                 ),
             ),
-            blocks={"frame": spring},
+            blocks={"frame": stiffening},
+        ),
+        Form(
+            name="power",
+            what="deflection goes with a power of the force",
+            parameters=(
+                _compliance("deflection per newton at small forces"),
+                Parameter("exponent", "1", 0.1, 1.5, 2.0 / 3.0, "power of the force in N", starts=(0.4, 0.8)),
+            ),
+            blocks={"frame": power},
         ),
     ),
 )

@@ -13,6 +13,9 @@ since the last reversal, rises with it, and is a continuous function of position
   survey of models, analysis tools and compensation methods for the control of machines with friction, Automatica 30,
   1994, 1083–1138).
 
+- `load_dependent`: Prandtl's element whose slider holds F_c (1 + load · δ): guides and seals that bear more the deeper
+  the probe stands in the pad (F. P. Bowden, D. Tabor, The Friction and Lubrication of Solids, Oxford, 1950).
+
 State: last position, force, whether there was a position yet. A first position is rest without friction force.
 """
 
@@ -23,7 +26,7 @@ import math
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
-_LAST, _FORCE, _STARTED = range(3)
+_LAST, _FORCE, _STARTED, _DEPTH = range(4)
 
 
 @block
@@ -68,12 +71,47 @@ def stribeck(dt: float, y: float, state: State, p: State) -> float:
     return force + viscous
 
 
-_COULOMB = Parameter("coulomb", "N", 0.0, 50.0, 0.05, "friction force while sliding, on either side", required=True)
-_PRESLIDING = Parameter("presliding", "mm", 1e-6, 1.0, 0.001, "distance over which friction builds up after a reversal")
+@block
+def note_depth(dt: float, depth: float, state: State, p: State) -> float:
+    """Leaves the depth as it is, and notes it for the friction."""
+    state[_DEPTH] = max(depth, 0.0)
+    return depth
+
+
+@block
+def load_dependent(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element with a slider that depends on depth; p = (coulomb, load, presliding)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    limit = p[0] * (1.0 + p[1] * state[_DEPTH])
+    force = state[_FORCE] + moved * (limit / p[2])
+    force = max(-limit, min(limit, force))
+    state[_FORCE] = force
+    return force
+
+
+_COULOMB = Parameter(
+    "coulomb",
+    "N",
+    0.0,
+    50.0,
+    0.05,
+    "friction force while sliding, on either side",
+    required=True,
+    amplitude=True,
+    floor=("force_noise_N", 0.3),
+)
+_PRESLIDING = Parameter(
+    "presliding", "mm", 1e-6, 1.0, 0.001, "distance over which friction builds up after a reversal", fixed=True
+)
 
 EFFECT = Effect(
     id="friction",
     what="Friction at the probe acts against its motion and is felt by the load cell.",
+    says="friction of {coulomb:.4g} N acts against the motion, either way",
+    check="align and grease the guide; see whether cable or seal drags; move slowly in free air and back",
+    reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30, 1994, 1083-1138",
     forms=(
         Form(
             name="coulomb",
@@ -88,10 +126,22 @@ EFFECT = Effect(
             parameters=(
                 _COULOMB,
                 Parameter(
-                    "static_ratio", "1", 1.0, 5.0, 1.6, "friction near rest over friction while sliding, F_s/F_c"
+                    "static_ratio",
+                    "1",
+                    1.0,
+                    5.0,
+                    1.6,
+                    "friction near rest over friction while sliding, F_s/F_c",
+                    starts=(1.2, 2.0),
                 ),
                 Parameter(
-                    "stribeck_speed", "mm/s", 1e-3, 1e3, 2.0, "speed at which the excess at rest has fallen to 1/e"
+                    "stribeck_speed",
+                    "mm/s",
+                    1e-3,
+                    1e3,
+                    2.0,
+                    "speed at which the excess at rest has fallen to 1/e",
+                    starts=(0.5, 5.0),
                 ),
                 Parameter("viscous", "N*s/mm", 0.0, 10.0, 0.0, "further force per speed"),
                 _PRESLIDING,
@@ -105,11 +155,28 @@ EFFECT = Effect(
             parameters=(
                 _COULOMB,
                 Parameter(
-                    "presliding", "mm", 1e-6, 5.0, 0.02, "distance over which friction builds up after a reversal"
+                    "presliding",
+                    "mm",
+                    1e-6,
+                    5.0,
+                    0.02,
+                    "distance over which friction builds up after a reversal",
+                    starts=(0.005, 0.03, 0.2),
                 ),
             ),
             blocks={"probe": dahl},
             state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="load_dependent",
+            what="grows with the depth in the pad",
+            parameters=(
+                _COULOMB,
+                Parameter("load", "1/mm", 0.0, 20.0, 0.5, "relative growth per mm of depth", starts=(0.3, 2.0)),
+                _PRESLIDING,
+            ),
+            blocks={"depth": note_depth, "probe": load_dependent},
+            state=(0.0, 0.0, 0.0, 0.0),
         ),
     ),
 )

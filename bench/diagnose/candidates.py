@@ -1,0 +1,185 @@
+"""Which causes could be missing, and from where to start each of them.
+
+A start is chosen by what the cause's first-order signature, beyond what the pad's own numbers can imitate, takes of the
+residual; it is only a start: a candidate is judged by a joint refit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from sim.effects import all_effects
+from sim.effects.base import Effect, Form
+from sim.elastic import NoPad
+
+from .data import Data
+from .numbers import Cause, Structure, cause_of
+from .refit import Fit, errors, force_at, jacobian
+
+Array = NDArray[np.float64]
+
+CHANNEL = ("outliers", "stuck_samples")  # found by detectors, not by fitting
+MOST_STARTS = 48
+REPEATABLE = ("missing_relaxation_mode", "mains_hum")
+
+
+@dataclass(frozen=True)
+class Start:
+    """A cause with values to start from, and the χ² that its signature promises to take."""
+
+    cause: Cause
+    promise: float
+
+
+def forms(structure: Structure, in_air: bool) -> list[tuple[Effect, Form]]:
+    """All forms of all effects that may be added to a structure."""
+    present = {c.id for c in structure.causes}
+    out = []
+    for effect in all_effects().values():
+        if effect.id in CHANNEL or effect.id in present:
+            continue
+        for form in effect.forms:
+            if in_air and not _in_air(form):
+                continue
+            if form.amend is not None and not _amends(structure, form):
+                continue
+            out.append((effect, form))
+    return out
+
+
+def _in_air(form: Form) -> bool:
+    if form.amend is not None:
+        return False
+    pads = {"depth", "elastic", "rate", "contact", "gap", "frame"}
+    return form.time_shift is None and not pads & set(form.blocks)
+
+
+def _amends(structure: Structure, form: Form) -> bool:
+    """Whether the form changes the pad at all (separation of a pad that lets go already does not)."""
+    pad = structure.pad.pad
+    values = {p.name: p.typical for p in form.parameters}
+    assert form.amend is not None
+    return form.amend(pad, values) != pad and not isinstance(pad.law, NoPad)
+
+
+class Signatures:
+    """Judges signatures at one fit: residual and the pad's own derivatives, taken out by projection."""
+
+    def __init__(self, data: Data, fit: Fit) -> None:
+        self.data, self.fit = data, fit
+        self.force = force_at(data, fit.structure, fit.x)
+        self.scale = np.sqrt(data.weight) / data.sigma_N
+        J = jacobian(data, fit.structure, fit.x, self.force)
+        norm = np.linalg.norm(J, axis=0)
+        J = J[:, norm > 1e-9 * max(float(norm.max(initial=0.0)), 1e-300)]
+        self.Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
+        self.residual = self._clear(self.scale * (data.force_N - self.force))
+
+    def _clear(self, column: Array) -> Array:
+        return np.asarray(column - self.Q @ (self.Q.T @ column))
+
+    def of(self, cause: Cause) -> tuple[float, float]:
+        """(χ² that the cause's signature takes, amplitude at which it does); amplitude within the bounds."""
+        amplitude = cause.amplitude
+        assert amplitude is not None
+        size = 0.3 * (abs(amplitude.typical) or 1.0)
+        if size > amplitude.upper:
+            size = 0.5 * amplitude.upper
+        structure = self.fit.structure.with_cause(cause.with_start(**{amplitude.name: size}))
+        added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
+        x = _with(self.fit, added)
+        column = self._clear(self.scale * (force_at(self.data, structure, x) - self.force) / size)
+        square = float(column @ column)
+        if not np.isfinite(square) or square <= 1e-18:
+            return 0.0, 0.0
+        best = float(column @ self.residual) / square
+        best = min(max(best, amplitude.lower), amplitude.upper)
+        return best * (2 * float(column @ self.residual) - best * square), best
+
+
+def _with(fit: Fit, added: Array) -> Array:
+    n = len(fit.x) - (1 if fit.structure.doubt_mm > 0 else 0)
+    return np.concatenate([fit.x[:n], added, fit.x[n:]])
+
+
+def combinations(form: Form, limits: Mapping[str, float]) -> Iterator[dict[str, float]]:
+    """Values to start the form's shape from: all combinations, thinned where there are too many."""
+    shapes = [p for p in form.parameters if not p.amplitude and not p.fixed and p.starts]
+    several: Iterable[tuple[float, ...]] = product(*(p.starts for p in shapes))
+    every = list(several)
+    stride = max(1, -(-len(every) // MOST_STARTS))
+    for values in every[::stride]:
+        yield dict(zip([p.name for p in shapes], values, strict=True))
+
+
+def starts(data: Data, signatures: Signatures, effect: Effect, form: Form, most: int = 2) -> list[Start]:
+    """The most promising starts of a form, best first."""
+    cause = cause_of(effect, form)
+    if form.amend is not None and cause.amplitude is None:
+        return [Start(c, np.inf) for c in _amended(signatures.fit, cause)]
+    if cause.amplitude is None:
+        return [Start(cause.with_start(**values), np.inf) for values in combinations(form, {})][:most]
+    amplitude = cause.amplitude
+    found: list[Start] = []
+    for values in combinations(form, {}):
+        trial = cause.with_start(**values)
+        promise, best = signatures.of(trial)
+        least = 0.05 * abs(amplitude.typical)
+        sign = -1.0 if best < 0 else 1.0
+        size = min(max(abs(best), least), 5 * abs(amplitude.typical) or abs(best))
+        found.append(Start(trial.with_start(**{amplitude.name: _inside(sign * size, amplitude.lower, amplitude.upper)}),
+                           promise))  # fmt: skip
+    found.sort(key=lambda s: -s.promise)
+    return found[:most]
+
+
+def _inside(value: float, lower: float, upper: float) -> float:
+    return min(max(value, lower), upper)
+
+
+def _amended(fit: Fit, cause: Cause) -> list[Cause]:
+    """Another law in place of the believed: numbers with which it is near the curve that was fitted."""
+    structure = fit.structure
+    pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
+    fitted = cause.fitted
+    assert cause.form.amend is not None
+    amend = cause.form.amend
+    if not fitted or amend(pad, cause.start).law == pad.law:
+        return [cause]
+    depth = np.linspace(0.02, 1.0, 60) * structure.pad.depth_mm
+    wanted = pad.law.force(depth)
+    scale = max(float(np.abs(wanted).max()), 1e-12)
+    probe = Structure(structure.pad, (cause,))
+    at = probe.of_cause(0)
+    lower, upper = probe.lower[at], probe.upper[at]
+    base = probe.x(fit.x[: len(structure.pad.coordinates)])
+
+    def error(numbers: Array) -> Array:
+        x = base.copy()
+        x[at] = numbers
+        with np.errstate(all="ignore"):
+            law = amend(pad, probe.values(x)[0]).law
+            off = (law.force(depth) - wanted) / scale
+        return np.where(np.isfinite(off), np.clip(off, -1e6, 1e6), 1e6)
+
+    best = None
+    for shrink in (1.0, 0.3, 3.0):
+        x0 = np.clip(base[at] * shrink, lower + 1e-9, upper - 1e-9)
+        solution = least_squares(error, x0, bounds=(lower, upper), x_scale="jac", max_nfev=200)
+        if best is None or solution.cost < best.cost:
+            best = solution
+    assert best is not None
+    x = base.copy()
+    x[at] = best.x
+    return [cause.with_start(**probe.values(x)[0])]
+
+
+def residual_of(data: Data, fit: Fit) -> Array:
+    """Errors of a fit in units of the noise (n,)."""
+    return errors(data, fit.structure, fit.x)

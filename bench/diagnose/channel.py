@@ -1,0 +1,158 @@
+"""Faults of the force channel, found in the samples themselves: stuck values, a ceiling, outliers.
+
+Asked before any model, and again about what a model leaves: transients look like spikes against a wrong model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student_t
+
+from .motion import resolution
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
+CEILING = 8  # samples in a row at the greatest force
+FAR = 6.0  # noise deviations that an outlier stands off at the least
+DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
+RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data
+
+
+@dataclass(frozen=True)
+class Faults:
+    """Of each force sample (m,), whether it is at a ceiling, repeats the one before, or stands off. `limit_N`: the
+    ceiling, where there is one."""
+
+    saturated: Mask
+    stuck: Mask
+    outlier: Mask
+    limit_N: float | None = None
+
+    @property
+    def good(self) -> Mask:
+        """Samples that tell of the force."""
+        return ~(self.saturated | self.stuck | self.outlier)
+
+    @property
+    def fraction(self) -> float:
+        """Share of samples flagged."""
+        return float(np.mean(~self.good))
+
+
+def faults(force_N: Array) -> Faults:
+    """What the samples (m,) show by themselves."""
+    none = np.zeros(len(force_N), dtype=bool)
+    if len(force_N) < 30:
+        return Faults(none, none, none)
+    saturated, limit = _ceiling(force_N)
+    stuck = _stuck(force_N, saturated)
+    outlier = _spikes(force_N, ~(saturated | stuck))
+    return Faults(saturated, stuck, outlier, limit)
+
+
+def _runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """(first sample, length) of every run of equal values."""
+    first = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
+    return first, np.diff(np.concatenate([first, [len(values)]]))
+
+
+def _ceiling(force: Array) -> tuple[Mask, float | None]:
+    """Samples at the greatest (or least) value, where many in a row share it and nothing is beyond."""
+    mask = np.zeros(len(force), dtype=bool)
+    first, length = _runs(force)
+    span = float(np.ptp(force))
+    if span == 0.0:
+        return mask, None
+    for sign in (1.0, -1.0):
+        top = float((sign * force).max())
+        if abs(top) < 0.05 * span:
+            continue
+        at = sign * force[first] >= top - 1e-9 * span
+        # Elsewhere runs are as long as resolution and noise make them: a ceiling's are of another size.
+        usual = float(np.quantile(length[~at], 0.999)) if (~at).any() else 1.0
+        longest = int(length[at].max(initial=0))
+        if longest >= max(CEILING, 3.0 * usual) and int(length[at].sum()) >= CEILING:
+            mask |= sign * force >= top - 1e-9 * span
+            return mask, sign * top
+    return mask, None
+
+
+def _stuck(force: Array, but: Mask) -> Mask:
+    """Samples that repeat the one before in runs longer than resolution and noise make them."""
+    mask = np.zeros(len(force), dtype=bool)
+    first, length = _runs(force)
+    runs = length[~but[first]]
+    if len(runs) < 2:
+        return mask
+    step = resolution(force)
+    # how often a sample equals the one before when nothing sticks: judged where values change most
+    same = np.concatenate([[0.0], (np.diff(force) == 0).astype(float)])
+    if step == 0.0:
+        least = 3 if np.mean(same) < 0.2 else 4
+    else:
+        window = max(len(force) // 40, 20)
+        shares = np.convolve(same, np.ones(window) / window, mode="same")
+        p = min(max(float(np.median(shares[window:-window] if len(force) > 3 * window else shares)), 0.05), 0.97)
+        least = int(np.ceil(np.log(CHANCE / len(force)) / np.log(p))) + 1
+    for start, count in zip(first.tolist(), length.tolist(), strict=True):
+        if count >= least and not but[start]:
+            mask[start + 1 : start + count] = True
+    return mask
+
+
+def _spikes(force: Array, good: Mask) -> Mask:
+    """Single samples (or two) far off a line between their neighbours, with no such step beside them."""
+    mask = np.zeros(len(force), dtype=bool)
+    index = np.flatnonzero(good)
+    y = force[index]
+    if len(y) < 30:
+        return mask
+    noise = 1.4826 * float(np.median(np.abs(np.diff(y, 2) - np.median(np.diff(y, 2))))) / np.sqrt(6.0)
+    noise = max(noise, resolution(force) / np.sqrt(12.0), 1e-12)
+    padded = np.pad(y, 3, mode="edge")
+    around = np.stack([padded[k : k + len(y)] for k in (0, 1, 2, 4, 5, 6)])
+    middle = np.median(around, axis=0)
+    spread = np.sort(around, axis=0)
+    reach = spread[-2] - spread[1]  # in a move the neighbours themselves lie apart
+    off = np.abs(y - middle)
+    quiet = reach <= np.quantile(reach, 0.5)  # in holds the differences are noise alone
+    limit = max(far((y - middle)[quiet]), FAR * noise)
+    mask[index[off > limit + 2.0 * reach]] = True
+    return mask
+
+
+def far(values: Array) -> float:
+    """Distance from 0 beyond which a value (n,) is no noise, by the tail that its bulk foretells (Student's t).
+
+    The tail is read off the quantiles at 50, 80 and 95 %, which a few per cent of outliers hardly move.
+    """
+    size = np.abs(values)
+    q50, q80, q95 = (float(q) for q in np.quantile(size, [0.5, 0.8, 0.95]))
+    if q50 <= 0.0:
+        return np.inf
+    ratios = student_t.ppf([0.9, 0.975], DEGREES[:, None]) / student_t.ppf(0.75, DEGREES)[:, None]
+    k = int(np.argmin((ratios[:, 0] - q80 / q50) ** 2 * 4.0 + (ratios[:, 1] - q95 / q50) ** 2))
+    degrees = float(DEGREES[k])
+    scale = q50 / float(student_t.ppf(0.75, degrees))
+    return scale * max(float(student_t.isf(RARE / len(values) / 2, degrees)), FAR)
+
+
+def standing_off(residual: Array, good: Mask) -> Mask:
+    """Outliers against a model: single residuals (m,) far beyond their neighbours'."""
+    mask = np.zeros(len(residual), dtype=bool)
+    index = np.flatnonzero(good)
+    if len(index) < 30:
+        return mask
+    e = residual[index]
+    padded = np.pad(e, 2, mode="edge")
+    around = np.stack([padded[k : k + len(e)] for k in (0, 1, 3, 4)])
+    off = np.abs(e - np.median(around, axis=0))
+    calm = np.sort(np.abs(around - np.median(around, axis=0)), axis=0)[-2]
+    limit = far(e - np.median(around, axis=0))
+    mask[index[off > limit + 3.0 * calm]] = True
+    return mask

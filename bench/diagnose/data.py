@@ -1,0 +1,195 @@
+"""What a diagnosis works on: one measurement on one grid, with its noise; and a short stand-in for searching."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.identify.noise import stiffness_along
+from bench.identify.problem import build
+from bench.recording.types import Measurement
+from sim.jit import compiled
+
+from .motion import felt, position_noise, resolution
+from .noise import Colour, ForceNoise, force_noise
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+BLOCKS, FOLDS = 20, 5
+SHORT = 1500  # samples that need no stand-in
+TARGET = 4000  # samples of the stand-in, where its blocks can be that long
+
+
+@dataclass(frozen=True)
+class Data:
+    """One grid of stamps; all arrays (n,). `weight`: force samples that an entry stands for, 0: none, or history."""
+
+    time_s: Array
+    position_mm: Array
+    force_N: Array
+    weight: Array
+    sigma_N: Array
+    """Standard deviation of one force sample there."""
+    fold: NDArray[np.intp]
+
+    @property
+    def size(self) -> int:
+        """Entries of the grid."""
+        return len(self.time_s)
+
+    def without(self, fold: int) -> Data:
+        """One fold's samples out of the cost."""
+        return replace(self, weight=np.where(self.fold == fold, 0.0, self.weight))
+
+    def only(self, fold: int) -> Data:
+        """One fold's samples alone in the cost."""
+        return replace(self, weight=np.where(self.fold == fold, self.weight, 0.0))
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """`full`: every sample; `short`: blocks; `owner` (full.size,): the block of each. `at`: force samples in `full`."""
+
+    name: str
+    full: Data
+    short: Data
+    owner: NDArray[np.intp]
+    at: NDArray[np.intp]
+    noise: ForceNoise
+    position_noise_mm: float
+    sample_s: float
+    doubt_mm: float
+    depth_mm: float
+    force_scale_N: float
+
+    @property
+    def colour(self) -> Colour:
+        """Of the force's noise."""
+        return self.noise.colour
+
+    @property
+    def floor_N(self) -> float:
+        """RMS of an error with nothing left to explain."""
+        w = self.full.weight
+        return float(np.sqrt(np.sum(w * self.full.sigma_N**2) / max(w.sum(), 1.0)))
+
+
+def prepare(m: Measurement, good: Mask) -> Prepared:
+    """Grid, noise and stand-in. `good` (m,): force samples that are not channel faults.
+
+    Raises InputError as a fit does, for data that cannot be fitted at all.
+    """
+    position_sigma = position_noise(m.position_mm)
+    positions, left = felt(m.position_time_s, m.position_mm)
+    noise = force_noise(m, good)
+    step = resolution(m.force_N)
+    sigma_force = max(noise.force_N, step / np.sqrt(12.0), 1e-9)
+    problem = build([replace(m, position_mm=positions)])
+    run, where = problem.runs[0], problem.where[0]
+    m = problem.measurements[0]
+    good = good[-len(m.force_N) :] if len(good) != len(m.force_N) else good
+    stiffness = stiffness_along(m)
+    through = stiffness * np.interp(m.force_time_s, m.position_time_s, left[: len(m.position_time_s)])
+    sigma = np.full(run.size, sigma_force)
+    sigma[where] = np.sqrt(sigma_force**2 + through**2)
+    weight = run.weight.copy()
+    weight[where[~good]] = 0.0
+    time, position, force = run.time_s, run.u * problem.depth_mm, run.y * problem.force_N
+    fold = _folds(time, position, weight, problem.depth_mm)
+    full = Data(time, position, force, weight, sigma, fold)
+    owner = _blocks(full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(left, 0.9)))
+    return Prepared(
+        name=m.name,
+        full=full,
+        short=_averaged(full, owner),
+        owner=owner,
+        at=where,
+        noise=replace(noise, force_N=sigma_force),
+        position_noise_mm=position_sigma,
+        sample_s=float(np.median(np.diff(m.force_time_s))),
+        doubt_mm=m.surface_std_mm,
+        depth_mm=problem.depth_mm,
+        force_scale_N=problem.force_N,
+    )
+
+
+def _folds(time: Array, position: Array, weight: Array, depth_mm: float) -> NDArray[np.intp]:
+    """Contiguous blocks dealt out in turn; half by samples and half by travel, so that fast moves are spread too."""
+    travel = np.abs(np.diff(position, prepend=position[0]))
+    travel[travel < 2e-3 * depth_mm] = 0.0
+    along = np.cumsum(weight / max(weight.sum(), 1.0) / 2 + travel / max(travel.sum(), 1e-300) / 2)
+    return np.minimum((along * BLOCKS).astype(np.intp), BLOCKS - 1) % FOLDS
+
+
+def _blocks(full: Data, stiffness: float, sigma_force: float, jump_mm: float) -> NDArray[np.intp]:
+    """Blocks that cannot hide a step of force, and grow with the time since the speed last changed."""
+    n = full.size
+    if n <= SHORT:
+        return np.arange(n)
+    rate = 0.05
+    while True:
+        owner = _grouped(full, stiffness, sigma_force * (rate / 0.05), rate, jump_mm)
+        if owner[-1] < TARGET or rate > 0.12:
+            return owner
+        rate *= 1.4
+
+
+def _grouped(full: Data, stiffness: float, step_N: float, rate: float, jump_mm: float) -> NDArray[np.intp]:
+    """`jump_mm`: what noise alone makes of a change of speed; `step_N`: force that the travel within a block may make; `rate`: growth of blocks."""
+    reach = step_N / max(stiffness, 1e-9)
+    position = full.position_mm
+    step = np.diff(position, prepend=position[0])
+    turns = np.zeros(full.size, dtype=bool)
+    turns[0] = True
+    for k in (1, 3, 9, 27):  # changes of speed over so many samples
+        bent = np.abs(position[2 * k :] - 2 * position[k:-k] + position[: -2 * k]) > max(0.5 * reach, jump_mm)
+        turns[k:-k] |= bent
+    corner = np.flatnonzero(turns)
+    index = np.arange(full.size)
+    since = index - corner[np.searchsorted(corner, index, side="right") - 1]
+    return _cut(
+        np.cumsum(np.abs(step)), since.astype(np.float64), reach, rate, full.fold, (full.weight > 0).astype(np.int64)
+    )
+
+
+@compiled("int64[::1](float64[::1], float64[::1], float64, float64, int64[::1], int64[::1])")
+def _cut(
+    travelled: Array, since: Array, reach: float, rate: float, fold: NDArray[np.intp], counts: NDArray[np.int64]
+) -> NDArray[np.intp]:
+    """The block of each sample; the first sample, a jump from rest, stays alone."""
+    n = travelled.shape[0]
+    owner = np.zeros(n, dtype=np.int64)
+    at, block = 1, 1
+    while at < n:
+        most = max(1, int(rate * since[at]))
+        end = at + 1
+        while (
+            end < n
+            and end - at < most
+            and fold[end] == fold[at]
+            and counts[end] == counts[at]
+            and travelled[end] - travelled[at] <= reach
+            and since[end] > 0
+        ):
+            end += 1
+        for k in range(at, end):
+            owner[k] = block
+        block += 1
+        at = end
+    return owner
+
+
+def _averaged(full: Data, owner: NDArray[np.intp]) -> Data:
+    count = np.bincount(owner).astype(np.float64)
+    weight = np.asarray(np.bincount(owner, full.weight), dtype=np.float64)
+    inverse = np.asarray(np.bincount(owner, full.weight / full.sigma_N**2), dtype=np.float64)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        force = np.where(weight > 0, np.bincount(owner, full.weight * full.force_N) / weight, 0.0)
+        sigma = np.where(weight > 0, np.sqrt(weight / inverse), full.sigma_N.max())
+    time = np.bincount(owner, full.time_s) / count
+    position = np.bincount(owner, full.position_mm) / count
+    starts = np.flatnonzero(np.diff(owner, prepend=-1))
+    return Data(time, position, force, weight, sigma, full.fold[starts])

@@ -1,0 +1,82 @@
+"""When a cause is believed: beyond chance over everything tried, beyond a crumb, and beyond what could be measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2 as chi2_law
+
+from .data import Prepared
+from .refit import Fit
+
+LEVEL = 0.01  # of a false alarm over all that is tried
+TRIED = 150.0  # candidates with their starts, as independent tries
+CRUMB = 0.002  # of the noise power: what is smaller is no finding
+SHARE = 0.003  # of what all causes take together: what a further cause must take at the least
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A step from one fit to the next: Δχ² as if all samples were independent, and as the noise's colour leaves it."""
+
+    delta_chi2: float
+    effective: float
+    freedom: int
+    threshold: float
+    share: float
+    """Of what the base leaves beyond the noise."""
+    crumb: float
+    """Δχ² over the number of samples."""
+    first: bool
+
+    @property
+    def significant(self) -> bool:
+        """More than chance."""
+        return self.effective > self.threshold
+
+    @property
+    def pays(self) -> bool:
+        """Significant, and large enough to speak of."""
+        return self.significant and self.crumb >= CRUMB and (self.first or self.share >= SHARE)
+
+
+def threshold(freedom: int) -> float:
+    """Δχ² that chance passes once in a hundred diagnoses."""
+    return float(chi2_law.isf(LEVEL / TRIED, max(freedom, 1)))
+
+
+def evidence_of(before: Fit, after: Fit, base: Fit, inflation: float, samples: float) -> Evidence:
+    """What the step from `before` to `after` is worth; `inflation`: of the variance along that step, by colour."""
+    delta = before.chi2 - after.chi2
+    freedom = max(after.free - before.free, 1)
+    excess = max(base.chi2 - samples, 1e-9)
+    return Evidence(
+        delta_chi2=delta,
+        effective=delta / inflation,
+        freedom=freedom,
+        threshold=threshold(freedom),
+        share=delta / max(excess, delta),
+        crumb=delta / samples,
+        first=before is base,
+    )
+
+
+def penalty(free: int, effective: float) -> float:
+    """What numbers cost, in χ² (Schwarz)."""
+    return free * float(np.log(effective))
+
+
+def believable(fit: Fit, prepared: Prepared) -> bool:
+    """Whether the last cause's numbers are beyond what such data could show at all."""
+    cause = fit.structure.causes[-1]
+    values = fit.structure.values(fit.x)[-1]
+    limits = {
+        "sample_s": prepared.sample_s,
+        "position_noise_mm": prepared.position_noise_mm,
+        "force_noise_N": prepared.noise.force_N,
+    }
+    for p in cause.form.parameters:
+        if p.floor is not None and abs(values[p.name]) < p.floor[1] * limits[p.floor[0]]:
+            return False
+    return True

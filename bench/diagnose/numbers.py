@@ -1,0 +1,235 @@
+"""The numbers of a pad and its effects as one vector for least squares, and back.
+
+Coordinates are of order one and bounded: logarithms of what is above 0 by nature, shares as c_i = e_i/(1 + Σ e), so
+that they never add up to more than 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.effects import Active, Effect, Form
+from sim.effects.base import Parameter
+from sim.elastic import ElasticLaw, Exponential, NoPad, Polynomial, Power, Spline
+from sim.pad import Cascade, Pad
+from sim.relaxation import Relaxation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One entry of the vector: value = exp(x) or x · unit, between bounds on x."""
+
+    name: str
+    lower: float
+    upper: float
+    logarithmic: bool = False
+    unit: float = 1.0
+
+    def value(self, x: float) -> float:
+        """The number itself."""
+        return float(np.exp(x)) if self.logarithmic else x * self.unit
+
+    def x(self, value: float) -> float:
+        """The coordinate of a number, within the bounds."""
+        x = np.log(max(value, 1e-300)) if self.logarithmic else value / self.unit
+        return float(min(max(x, self.lower), self.upper))
+
+
+def _positive(name: str, low: float = 1e-12, high: float = 1e12) -> Coordinate:
+    return Coordinate(name, float(np.log(low)), float(np.log(high)), True)
+
+
+def _spline(law: Spline) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Depths and forces of its points with (0, 0) before them."""
+    if law.delta_mm[0] == 0.0:
+        return law.delta_mm, law.force_N
+    return (0.0, *law.delta_mm), (0.0, *law.force_N)
+
+
+@dataclass(frozen=True)
+class PadNumbers:
+    """How one pad (law, order, contact) is laid out; `depth_mm` and `force_N` are the scales of the data."""
+
+    pad: Pad
+    depth_mm: float
+    force_N: float
+
+    @property
+    def coordinates(self) -> list[Coordinate]:
+        """The law's numbers, then e_1 … e_r, then the rates."""
+        r = self.pad.relaxation.order
+        shares = [Coordinate(f"c_{i}", 0.0, 1e3) for i in range(1, r + 1)]
+        return [*self._law(), *shares, *(_positive(f"nu_{i}", 1e-5, 1e5) for i in range(1, r + 1))]
+
+    def _law(self) -> list[Coordinate]:
+        law, D, F = self.pad.law, self.depth_mm, self.force_N
+        if isinstance(law, Exponential):
+            return [_positive("m"), Coordinate("b", -25.0, 60.0, unit=1 / D)]
+        if isinstance(law, Power):
+            return [_positive("p"), Coordinate("q", -0.95, 30.0)]
+        if isinstance(law, Polynomial):
+            return [Coordinate(f"alpha_{i}", -1e4, 1e4, unit=F / D**i) for i in range(1, len(law.alpha))]
+        if isinstance(law, Spline):
+            return [Coordinate(f"rise_{i}", 0.0, 1e4, unit=F) for i in range(1, len(_spline(law)[0]))]
+        return []
+
+    def x(self) -> Array:
+        """The vector of the pad itself."""
+        law, relaxation = self.pad.law, self.pad.relaxation
+        if isinstance(law, Spline):
+            numbers = list(np.diff(_spline(law)[1]))
+        elif isinstance(law, Polynomial):
+            numbers = list(law.alpha[1:])
+        else:
+            numbers = list(law.parameters.values())
+        c_0 = max(relaxation.c_0, 1e-3)
+        numbers += [c / c_0 for c in relaxation.shares] + list(relaxation.rates)
+        return np.array([c.x(v) for c, v in zip(self.coordinates, numbers, strict=True)])
+
+    def at(self, x: Array) -> Pad:
+        """The pad at a vector."""
+        values = [c.value(v) for c, v in zip(self.coordinates, x.tolist(), strict=True)]
+        r = self.pad.relaxation.order
+        k = len(values) - 2 * r
+        law = self.pad.law
+        new: ElasticLaw = law
+        if isinstance(law, Exponential):
+            new = Exponential(values[0], values[1])
+        elif isinstance(law, Power):
+            new = Power(values[0], values[1])
+        elif isinstance(law, Polynomial):
+            new = Polynomial((law.alpha[0], *values[:k]))
+        elif isinstance(law, Spline):
+            new = Spline(_spline(law)[0], tuple(np.cumsum([0.0, *values[:k]]).tolist()))
+        if r == 0:
+            return replace(self.pad, law=new)
+        e = values[k : k + r]
+        whole = 1.0 + sum(e)
+        return replace(self.pad, law=new, relaxation=Relaxation(tuple(v / whole for v in e), tuple(values[k + r :])))
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One form of one effect, as a candidate or as part of a model; `start`: values of all its parameters."""
+
+    effect: Effect
+    form: Form
+    start: Mapping[str, float]
+
+    @property
+    def id(self) -> str:
+        """The effect's id."""
+        return self.effect.id
+
+    @property
+    def fitted(self) -> list[Parameter]:
+        """Parameters that least squares moves."""
+        return [p for p in self.form.parameters if not p.fixed]
+
+    @property
+    def amplitude(self) -> Parameter | None:
+        """The number that switches the effect off."""
+        return next((p for p in self.form.parameters if p.amplitude), None)
+
+    def with_start(self, **values: float) -> Cause:
+        """Other values to start from."""
+        return replace(self, start={**self.start, **values})
+
+
+def cause_of(effect: Effect, form: Form, given: Mapping[str, float] | None = None) -> Cause:
+    """With every parameter at its default, but for those given."""
+    start = {p.name: p.if_left_out for p in form.parameters}
+    return Cause(effect, form, start | dict(given or {}))
+
+
+def _coordinate(p: Parameter) -> Coordinate:
+    if p.logarithmic:
+        return Coordinate(p.name, float(np.log(p.lower)), float(np.log(p.upper)), True)
+    unit = abs(p.typical) or (p.upper - p.lower) / 10 or 1.0
+    return Coordinate(p.name, p.lower / unit, p.upper / unit, unit=unit)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A pad with effects, to be fitted: x = [pad, effects in order, surface].
+
+    `doubt_mm`: standard deviation of the surface, 0: it is certain.
+    """
+
+    pad: PadNumbers
+    causes: tuple[Cause, ...] = ()
+    doubt_mm: float = 0.0
+    coordinates: tuple[Coordinate, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        found = [*self.pad.coordinates, *(_coordinate(p) for c in self.causes for p in c.fitted)]
+        if self.doubt_mm > 0:
+            found.append(Coordinate("surface", -6.0, 6.0, unit=self.doubt_mm))
+        object.__setattr__(self, "coordinates", tuple(found))
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds of x."""
+        return np.array([c.lower for c in self.coordinates])
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds of x."""
+        return np.array([c.upper for c in self.coordinates])
+
+    @property
+    def prior(self) -> Array:
+        """What each coordinate squared costs, in χ²: the surface's doubt."""
+        return np.array([1.0 if c.name == "surface" else 0.0 for c in self.coordinates])
+
+    def with_cause(self, cause: Cause) -> Structure:
+        """One more cause."""
+        return replace(self, causes=(*self.causes, cause))
+
+    def x(self, pad_x: Array, causes: Sequence[Mapping[str, float]] | None = None, surface: float = 0.0) -> Array:
+        """The vector of a pad's own vector, the causes' values (their starts where not given) and the surface's."""
+        values = list(causes) if causes is not None else [c.start for c in self.causes]
+        parts = [pad_x]
+        for cause, v in zip(self.causes, values, strict=True):
+            parts.append(np.array([_coordinate(p).x(v[p.name]) for p in cause.fitted]))
+        if self.doubt_mm > 0:
+            parts.append(np.array([surface]))
+        return np.concatenate(parts)
+
+    def values(self, x: Array) -> list[dict[str, float]]:
+        """Of each cause, all its numbers."""
+        at = len(self.pad.coordinates)
+        out = []
+        for cause in self.causes:
+            numbers = dict(cause.start)
+            for p in cause.fitted:
+                numbers[p.name] = min(max(self.coordinates[at].value(float(x[at])), p.lower), p.upper)
+                at += 1
+            out.append(numbers)
+        return out
+
+    def of_cause(self, index: int) -> slice:
+        """Where the numbers of a cause stand in x."""
+        start = len(self.pad.coordinates) + sum(len(c.fitted) for c in self.causes[:index])
+        return slice(start, start + len(self.causes[index].fitted))
+
+    def surface_mm(self, x: Array) -> float:
+        """Depth added to all positions."""
+        return float(x[-1]) * self.doubt_mm if self.doubt_mm > 0 else 0.0
+
+    def cascade(self, x: Array) -> Cascade:
+        """The plant at x."""
+        pad = self.pad.at(x[: len(self.pad.coordinates)])
+        active = [Active(c.effect, c.form, v) for c, v in zip(self.causes, self.values(x), strict=True)]
+        return Cascade(pad, active)
+
+    @property
+    def in_air(self) -> bool:
+        """Whether there is no pad."""
+        return isinstance(self.pad.pad.law, NoPad)

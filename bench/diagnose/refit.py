@@ -1,0 +1,125 @@
+"""Least squares of a pad with its effects: free-running simulation against measured force, in units of the noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.identify.solver import minimise
+
+from .data import Data
+from .numbers import Structure
+
+Array = NDArray[np.float64]
+
+STEP = 1e-5  # of a coordinate of order one, for derivatives
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where a search ended: x (P,), χ² there (with the surface's prior), Gauss–Newton matrix (P, P)."""
+
+    structure: Structure
+    x: Array
+    chi2: float
+    matrix: Array
+    converged: bool
+
+    @property
+    def free(self) -> int:
+        """Numbers that the data move: those at a bound, or without any influence, are none."""
+        x, s = self.x, self.structure
+        inside = (x > s.lower) & (x < s.upper) & (np.diag(self.matrix) > 1e-9)
+        return int(inside.sum())
+
+    def covariance(self) -> Array:
+        """Of x (P, P), for white noise; 0 at bounds."""
+        s, scale = self.structure, np.sqrt(np.maximum(np.diag(self.matrix), 1e-300))
+        inside = (self.x > s.lower) & (self.x < s.upper) & (np.diag(self.matrix) > 1e-9)
+        out = np.zeros_like(self.matrix)
+        index = np.ix_(inside, inside)
+        if inside.any():
+            H = self.matrix[index] / np.outer(scale[inside], scale[inside])
+            values, vectors = np.linalg.eigh(H)
+            values = np.maximum(values, 1e-12 * values.max())
+            out[index] = (vectors / values) @ vectors.T / np.outer(scale[inside], scale[inside])
+        return out
+
+
+def force_at(data: Data, structure: Structure, x: Array) -> Array:
+    """Simulated force on the grid (n,), N; not finite where the numbers make no plant."""
+    position = data.position_mm + structure.surface_mm(x)
+    with np.errstate(all="ignore"):
+        return structure.cascade(x).simulate(data.time_s, position)
+
+
+def errors(data: Data, structure: Structure, x: Array) -> Array:
+    """√w (F − F_simulated)/σ on the grid (n,)."""
+    return np.asarray(np.sqrt(data.weight) / data.sigma_N * (data.force_N - force_at(data, structure, x)))
+
+
+def chi2(data: Data, structure: Structure, x: Array) -> float:
+    """Σ w e²/σ², and what a moved surface costs."""
+    e = errors(data, structure, x)
+    return float(e @ e + structure.prior @ x**2)
+
+
+def mean_square(data: Data, structure: Structure, x: Array) -> float:
+    """Mean squared error over the samples that count, N²."""
+    e = data.force_N - force_at(data, structure, x)
+    return float(np.sum(data.weight * e * e) / max(data.weight.sum(), 1.0))
+
+
+def jacobian(data: Data, structure: Structure, x: Array, force: Array | None = None) -> Array:
+    """∂(√w F/σ)/∂x (n, P), one-sided differences away from the bounds."""
+    scale = np.sqrt(data.weight) / data.sigma_N
+    base = force_at(data, structure, x) if force is None else force
+    lower, upper = structure.lower, structure.upper
+    out = np.empty((data.size, len(x)))
+    for j in range(len(x)):
+        h = STEP * max(1.0, abs(x[j]))
+        if x[j] + h > upper[j] or (x[j] < 0 and x[j] - h >= lower[j]):
+            h = -h
+        moved = x.copy()
+        moved[j] += h
+        out[:, j] = scale * (force_at(data, structure, moved) - base) / h
+    return out
+
+
+def refit(data: Data, structure: Structure, x0: Array, max_steps: int = 40, tolerance: float = 1e-7) -> Fit:
+    """From x0 to the minimum, or as far as `max_steps` go."""
+    prior = structure.prior
+
+    def normal(x: Array) -> tuple[float, Array, Array]:
+        force = force_at(data, structure, x)
+        J = jacobian(data, structure, x, force)
+        J[~np.isfinite(J)] = 0.0
+        e = np.sqrt(data.weight) / data.sigma_N * (data.force_N - force)
+        value = float(e @ e + prior @ x**2)
+        return value, J.T @ e - prior * x, J.T @ J + np.diag(prior)
+
+    solution = minimise(
+        normal, lambda x: chi2(data, structure, x), x0, structure.lower, structure.upper, max_steps, tolerance
+    )
+    return Fit(structure, solution.x, solution.cost, solution.matrix, solution.converged)
+
+
+def onto(fit: Fit, data: Data, max_steps: int = 25, tolerance: float = 1e-9) -> Fit:
+    """The same structure carried on with other data."""
+    return refit(data, fit.structure, fit.x, max_steps, tolerance)
+
+
+def extended(fit: Fit, structure: Structure, added: Array) -> Array:
+    """x of a structure with one cause more at its end: the fit's numbers, the cause's, the surface's."""
+    n = len(fit.x) - (1 if fit.structure.doubt_mm > 0 else 0)
+    return np.concatenate([fit.x[:n], added, fit.x[n:]])
+
+
+def reduced(fit: Fit, index: int) -> tuple[Structure, Array]:
+    """The structure without one of its causes, and the numbers that remain."""
+    s = fit.structure
+    gone = s.of_cause(index)
+    x = np.delete(fit.x, np.arange(gone.start, gone.stop))
+    return replace(s, causes=tuple(c for i, c in enumerate(s.causes) if i != index)), x

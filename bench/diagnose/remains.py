@@ -1,0 +1,108 @@
+"""Structure tests on what is left: averages of the residual that noise would not make, corrected for their number."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_law
+
+from bench.identify.motion import holds
+
+from .data import Data
+from .noise import Colour
+from .result import Remainder
+
+Array = NDArray[np.float64]
+
+LEVEL = 0.01
+CRUMB = 0.002
+SENTENCES = {
+    "depth": "differs with the depth",
+    "way": "differs between the way in and the way out",
+    "time": "changes in the course of the run",
+    "speed": "goes with the speed",
+    "phase": "follows the time since the last motion",
+    "corner": "stands where moves begin and end",
+    "memory": "is smoother from sample to sample than the noise",
+}
+
+
+def remains(data: Data, residual_N: Array, simulated_N: Array, colour: Colour, spent: int) -> list[Remainder]:
+    """The tests, most telling first. `residual_N`, `simulated_N` (n,) on the data's grid; `spent`: numbers fitted."""
+    use = np.flatnonzero(data.weight > 0)
+    if len(use) < 60:
+        return []
+    e = residual_N[use] / data.sigma_N[use]
+    groups = _groups(data, use)
+    made = len(groups) + 1
+    out = []
+    total = float(e @ e)
+    for name, number in groups.items():
+        value, count, found = _grouped(e, number, colour)
+        p = float(chi2_law.sf(value, max(count, 1)))
+        out.append(_remainder(name, p, found / total, made))
+    value, found = _memory(e, colour, spent)
+    out.append(_remainder("memory", float(chi2_law.sf(value, 1)), found, made))
+    return sorted(out, key=lambda r: (not r.passed, -r.share))
+
+
+def _remainder(name: str, p: float, share: float, made: int) -> Remainder:
+    return Remainder(name, p, share, SENTENCES[name], p * made < LEVEL and share > CRUMB)
+
+
+def _grouped(e: Array, number: NDArray[np.intp], colour: Colour) -> tuple[float, int, float]:
+    """(χ² of the group means, groups, what they take of Σ e² beyond chance)."""
+    value = taken = 0.0
+    count = 0
+    for k in range(int(number.max()) + 1):
+        inside = number == k
+        n = int(inside.sum())
+        if n < 8:
+            continue
+        direction = inside.astype(np.float64)
+        inflation = colour.inflation(direction)
+        part = float(e[inside].sum()) ** 2 / n
+        value += part / inflation
+        taken += max(part - inflation, 0.0)
+        count += 1
+    return value, count, taken
+
+
+def _memory(e: Array, colour: Colour, spent: int) -> tuple[float, float]:
+    """Power beyond the noise's own: (its standing as a χ² of one degree, share)."""
+    n = len(e)
+    excess = float(e @ e) / max(n - spent, 1) - 1.0
+    # the variance of a mean square of coloured noise, and of the noise's own estimate, which was no better
+    power = colour.share**2 * colour.phi**2 / (1.0 - colour.phi**2) if colour.phi < 1 else 0.0
+    spread = np.sqrt(2.0 / n * (1.0 + 2.0 * power)) * np.sqrt(3.0) + 0.06
+    return float(max(excess / spread, 0.0) ** 2), max(excess, 0.0) / (1.0 + max(excess, 0.0))
+
+
+def _groups(data: Data, use: NDArray[np.intp]) -> dict[str, NDArray[np.intp]]:
+    time, depth = data.time_s[use], data.position_mm[use]
+    reach = max(float(depth.max()), 1e-9)
+    still = np.zeros(data.size, dtype=bool)
+    since = np.zeros(data.size)
+    for s in holds(data.time_s, data.position_mm):
+        still[s] = True
+        since[s] = data.time_s[s] - data.time_s[s.start]
+    speed = np.gradient(data.position_mm, np.maximum.accumulate(data.time_s + 1e-12 * np.arange(data.size)))
+    still, since, speed = still[use], since[use], speed[use]
+    bins = np.clip((depth / reach * 10).astype(np.intp), -1, 9) + 1
+    way = np.where(still, 0, np.where(speed > 0, 1, 2))
+    fastest = max(float(np.abs(speed).max()), 1e-9)
+    paces = np.where(still, 0, 1 + np.clip((3 + np.log10(np.abs(speed) / fastest + 1e-12)) * 2, 0, 5).astype(np.intp))
+    span = max(float(time[-1] - time[0]), 1e-9)
+    corner = np.zeros(len(use), dtype=np.intp)
+    edges = np.flatnonzero(np.diff(still.astype(np.int8)))
+    for edge in edges.tolist():
+        corner[max(edge - 3, 0) : edge + 5] = 1 if still[min(edge + 1, len(still) - 1)] else 2
+    lap = np.where(still, 1 + np.clip(np.log2(1 + since / 0.02), 0, 9).astype(np.intp), 0)
+    return {
+        "depth": bins,
+        "way": bins * 3 + way,
+        "time": np.minimum(((time - time[0]) / span * 20).astype(np.intp), 19),
+        "speed": paces * 3 + way,
+        "phase": lap * 2 + (depth > 0.5 * reach),
+        "corner": corner,
+    }

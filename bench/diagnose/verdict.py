@@ -1,0 +1,148 @@
+"""From a search to a verdict: gains on held-out data, order, rivals, confidence, words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .candidates import forms
+from .data import Prepared
+from .held_out import held_out_square
+from .numbers import cause_of
+from .refit import Fit, onto, reduced, refit
+from .result import Alternative, CauseFound, Number
+from .search import Path, Search, Trial
+
+RIVAL = 25.0  # Δχ², rescaled by what is left: less does not exclude a rival
+EXPLAINED = 0.25
+
+
+def ordered(prepared: Prepared, fit: Fit, base: Fit) -> Fit:
+    """The causes in the order of what leaving each one out would cost."""
+    own = len(base.structure.causes)
+    number = len(fit.structure.causes)
+    if number - own < 2:
+        return fit
+    costs = []
+    for index in range(own, number):
+        structure, x = reduced(fit, index)
+        costs.append(refit(prepared.short, structure, x, 15, 1e-6).chi2)
+    order = list(range(own)) + [own + int(k) for k in np.argsort(-np.array(costs), kind="stable")]
+    structure = replace(fit.structure, causes=tuple(fit.structure.causes[i] for i in order))
+    values = fit.structure.values(fit.x)
+    pad = fit.x[: len(fit.structure.pad.coordinates)]
+    surface = fit.x[-1] if fit.structure.doubt_mm > 0 else 0.0
+    return replace(refit(prepared.short, structure, structure.x(pad, [values[i] for i in order], surface), 8, 1e-8))
+
+
+def chain(prepared: Prepared, fit: Fit, base: Fit) -> list[Fit]:
+    """Fits of the believed structure, with the first cause, with two …, up to all."""
+    own = len(base.structure.causes)
+    fits = [fit]
+    while len(fits[-1].structure.causes) > own + 1:
+        structure, x = reduced(fits[-1], len(fits[-1].structure.causes) - 1)
+        fits.append(refit(prepared.short, structure, x, 30, 1e-8))
+    return [base, *reversed(fits)] if len(fit.structure.causes) > own else [base]
+
+
+def excesses(prepared: Prepared, fits: Sequence[Fit]) -> tuple[list[float], list[float]]:
+    """(held-out mean squares, those less the noise floor's square and not below 0), N²."""
+    squares = [held_out_square(prepared, fit) for fit in fits]
+    floor = prepared.floor_N**2
+    return squares, [max(s - floor, 0.0) for s in squares]
+
+
+def rivals_of(search: Search, path: Path, fits: Sequence[Fit], index: int) -> list[Trial]:
+    """What stood beside a cause: other causes in its place, all the others kept, each at its best."""
+    final = fits[-1]
+    own = len(search.believed.causes)
+    if len(final.structure.causes) == own + 1 and path.rivals:
+        chosen = final.structure.causes[own].id
+        return [t for t in path.rivals[0] if t.id != chosen]
+    structure, x = reduced(final, own + index)
+    without = refit(search.short, structure, x, 20, 1e-6)
+    present = {c.id for c in final.structure.causes}
+    near: list[str] = []
+    for ranked in path.rivals:
+        near += [t.id for t in ranked[:5]]
+    ids = [i for i in dict.fromkeys(near) if i not in present]
+    return search.ranked(without, only=ids) if ids else []
+
+
+def alternatives(
+    search: Search, fit: Fit, without_chi2: float, rivals: Sequence[Trial]
+) -> tuple[list[Alternative], float]:
+    """(those that the data cannot exclude, and the strongest rival; confidence in the name)."""
+    colour = search.prepared.colour
+    best = fit.chi2
+    # what the family's shape leaves counts as noise when names are compared: no shape is exact
+    scale = max(best / max(search.samples, 1.0), 1.0) * np.sqrt(colour.memory)
+    gained = max(without_chi2 - best, 1e-12)
+    out: list[Alternative] = []
+    odds = 0.0
+    for t in rivals:
+        delta = t.fit.chi2 - best
+        extra = t.fit.free - fit.free
+        effective = delta / scale + extra * np.log(search.effective)
+        share = float(np.clip((without_chi2 - t.fit.chi2) / gained, 0.0, 1.0))
+        excluded = bool(effective > RIVAL and share < 0.995)
+        odds += float(np.exp(-0.5 * min(max(_tempered(effective, share), 0.0), 200.0)))
+        if not excluded or not out:
+            out.append(Alternative(t.id, t.cause.form.name, share, float(delta), excluded))
+    return out, 1.0 / (1.0 + odds)
+
+
+def _tempered(effective: float, share: float) -> float:
+    """Evidence against a rival, with the doubt that a shape of its family not tried here would do better."""
+    return min(effective, 6.0 + 400.0 * (1.0 - share))
+
+
+def described(fit: Fit, index: int, inflation: float) -> tuple[str, str, dict[str, Number]]:
+    """(id, form, numbers with standard errors) of a cause of a fit on all the data."""
+    cause = fit.structure.causes[index]
+    covariance = fit.covariance() * inflation
+    at = fit.structure.of_cause(index)
+    values = fit.structure.values(fit.x)[index]
+    out: dict[str, Number] = {}
+    position = at.start
+    for p in cause.form.parameters:
+        if p.fixed:
+            out[p.name] = Number(values[p.name], p.unit, float("nan"))
+            continue
+        spread = float(np.sqrt(max(covariance[position, position], 0.0)))
+        coordinate = fit.structure.coordinates[position]
+        scale = values[p.name] if coordinate.logarithmic else coordinate.unit
+        inside = coordinate.lower < fit.x[position] < coordinate.upper
+        out[p.name] = Number(values[p.name], p.unit, abs(scale) * spread if inside and spread > 0 else float("nan"))
+        position += 1
+    return cause.id, cause.form.name, out
+
+
+def found(search: Search, path: Path, fits: Sequence[Fit], final: Fit, gains: Sequence[float]) -> list[CauseFound]:
+    """The causes as the result has them. `final`: polished on all the data."""
+    own = len(search.believed.causes)
+    out = []
+    n = max(search.samples - final.free, 1.0)
+    overall = max(final.chi2 / n, 1.0)
+    for k, gain in enumerate(gains):
+        structure, x = reduced(fits[-1], own + k)
+        without = refit(search.short, structure, x, 20, 1e-6) if len(gains) > 1 else fits[0]
+        others, confidence = alternatives(search, fits[-1], without.chi2, rivals_of(search, path, fits, k))
+        id_, form, numbers = described(final, own + k, overall * search.prepared.colour.memory**0.5)
+        effect = final.structure.causes[own + k].effect
+        values = {name: number.value for name, number in numbers.items()}
+        out.append(CauseFound(id_, form, numbers, gain, confidence, others, explain(effect, values), effect.check))
+    return out
+
+
+def explain(effect: object, values: dict[str, float]) -> str:
+    """A plain sentence with the numbers in it; the effect's description where the form has other numbers."""
+    try:
+        return str(effect.explanation(values))  # type: ignore[attr-defined]
+    except KeyError:
+        return str(effect.what)  # type: ignore[attr-defined]
+
+
+__all__ = ["alternatives", "cause_of", "chain", "excesses", "forms", "found", "onto", "ordered"]

@@ -1,0 +1,51 @@
+"""The extended model as a model file's content."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sim.elastic import NoPad
+from sim.model import Model
+
+from .data import Prepared
+from .refit import Fit
+
+
+def model_of(believed: Model, fit: Fit, prepared: Prepared) -> dict[str, Any]:
+    """Pad and effects with the fit's numbers and their standard errors."""
+    structure = fit.structure
+    pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
+    order = np.argsort(-np.array(pad.relaxation.rates), kind="stable")
+    rates = [pad.relaxation.rates[i] for i in order]
+    for i in range(1, len(rates)):
+        rates[i] = min(rates[i], rates[i - 1] * (1 - 1e-9))
+    content: dict[str, Any] = {}
+    if believed.name:
+        content["name"] = believed.name
+    content["description"] = "what was believed, refitted and extended by a diagnosis"
+    entry: dict[str, Any] = {"elastic": pad.law.to_dict()}
+    if not isinstance(pad.law, NoPad):
+        entry["relaxation"] = {"shares": [pad.relaxation.shares[i] for i in order], "rates": rates}
+        entry["contact"] = "unilateral" if pad.unilateral else "bonded"
+    content["pad"] = entry
+    effects = []
+    covariance = fit.covariance() * max(fit.chi2 / max(float(prepared.full.weight.sum()) - fit.free, 1.0), 1.0)
+    for index, (cause, values) in enumerate(zip(structure.causes, structure.values(fit.x), strict=True)):
+        row: dict[str, Any] = {"id": cause.id, "form": cause.form.name}
+        position = structure.of_cause(index).start
+        for p in cause.form.parameters:
+            quantity: dict[str, Any] = {"value": float(values[p.name]), "unit": p.unit}
+            if not p.fixed:
+                c = structure.coordinates[position]
+                spread = float(np.sqrt(max(covariance[position, position], 0.0)))
+                spread *= abs(values[p.name]) if c.logarithmic else c.unit
+                if spread > 0:
+                    quantity["std"] = spread
+                position += 1
+            row[p.name] = quantity
+        effects.append(row)
+    if effects:
+        content["effects"] = effects
+    return content

@@ -1,0 +1,108 @@
+"""Adhesion: pad and probe attract each other, in contact by `pull_off`, and over a gap within about `range`.
+
+- `exponential`: −pull_off · e^(−gap/range); the same on the way in and out. In contact it is a constant pull, as in
+  the DMT theory (B. V. Derjaguin, V. M. Muller, Yu. P. Toporov, J. Colloid Interface Sci. 53, 1975, 314–326).
+- `linear`: −pull_off · (1 − gap/range) up to the range.
+- `van_der_waals`: −pull_off/(1 + gap/range)², the attraction of a sphere by a flat (J. N. Israelachvili, Intermolecular
+  and Surface Forces, 3rd ed., Academic Press, 2011).
+- `sticking`: hysteretic. A bond grows in contact within `dwell` s, stretches linearly over the range, and is gone
+  beyond: it pulls on the way out alone. Pull-off after contact, and a neck that snaps, are the marks of the JKR theory
+  (K. L. Johnson, K. Kendall, A. D. Roberts, Surface energy and the contact of elastic solids, Proc. R. Soc. Lond. A
+  324, 1971, 301–313).
+
+The gap is to the surface where it is, sunk as it may be by relaxation.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+_NEAR = 0.02
+"""Share of the range within which a bond grows: not 0, so that the force has no jump at touch."""
+
+
+@block
+def exponential(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range)."""
+    return -p[0] * math.exp(-gap / p[1])
+
+
+@block
+def linear(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range)."""
+    return -p[0] * max(0.0, 1.0 - gap / p[1])
+
+
+@block
+def van_der_waals(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range)."""
+    near = 1.0 / (1.0 + gap / p[1])
+    return -p[0] * near * near
+
+
+@block
+def sticking(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range, dwell); state: the share of the bond that has grown."""
+    if gap >= p[1]:
+        state[0] = 0.0
+        return 0.0
+    state[0] -= (1.0 - state[0]) * math.expm1(-dt / p[2] * math.exp(-gap / (_NEAR * p[1])))
+    return -p[0] * state[0] * (1.0 - gap / p[1])
+
+
+_PULL_OFF = Parameter(
+    "pull_off",
+    "N",
+    0.0,
+    100.0,
+    0.1,
+    "greatest pull",
+    required=True,
+    amplitude=True,
+    floor=("force_noise_N", 0.3),
+)
+_RANGE = Parameter(
+    "range", "mm", 1e-4, 20.0, 0.1, "gap over which the pull goes", required=True, starts=(0.02, 0.1, 0.5)
+)
+
+EFFECT = Effect(
+    id="adhesion",
+    what="Pad and probe attract each other: the pad pulls before it lets go.",
+    says="the pad sticks with {pull_off:.4g} N and lets go within {range:.3g} mm",
+    check="clean or powder the probe, and see whether the pull goes",
+    reference="Johnson, Kendall, Roberts, Proc. R. Soc. Lond. A 324, 1971, 301-313",
+    forms=(
+        Form(
+            name="exponential",
+            what="the pull falls exponentially with the gap",
+            parameters=(_PULL_OFF, _RANGE),
+            blocks={"gap": exponential},
+        ),
+        Form(
+            name="linear",
+            what="the pull falls linearly with the gap",
+            parameters=(_PULL_OFF, _RANGE),
+            blocks={"gap": linear},
+        ),
+        Form(
+            name="van_der_waals",
+            what="the pull falls with the square of the distance",
+            parameters=(_PULL_OFF, _RANGE),
+            blocks={"gap": van_der_waals},
+        ),
+        Form(
+            name="sticking",
+            what="pulls after contact alone, until the bond is torn",
+            parameters=(
+                _PULL_OFF,
+                _RANGE,
+                Parameter("dwell", "s", 1e-3, 100.0, 0.05, "time of contact in which the bond grows"),
+            ),
+            blocks={"gap": sticking},
+            state=(0.0,),
+        ),
+    ),
+)

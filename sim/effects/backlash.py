@@ -1,0 +1,124 @@
+"""Backlash: play between motor and probe, `gap` wide.
+
+- `play`: rigid. While pushing, the probe follows the motor without offset (touch-off is made so); while pulled back it
+  stays `gap` deeper. `start` says where in the play the data begin: 0 at the pushing side, 1 at the other.
+- `centred`: the same, counted from the middle: gap/2 to either side of the motor.
+- `gradual`: four plays of gap · (1 ± spread) side by side, so that the gap closes by and by (Prandtl and Ishlinskii's
+  operator: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer, 1996).
+- `loaded`: the gap is closed by the force itself, within `closing_force`: a joint that is loose at rest and seated
+  under load. Deflection gap · (1 − e^(−|F|/closing_force)) in the force's direction, solved with the pad.
+
+Reference: M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash, a survey, Automatica 38, 2002,
+1633–1649.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+_STARTED = 0
+
+
+@block
+def play(dt: float, x: float, state: State, p: State) -> float:
+    """Probe side, from x (pushing) to x + gap; p = (gap, start)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[1] = x + p[0] * p[1]
+    state[1] = min(max(state[1], x), x + p[0])
+    return state[1]
+
+
+@block
+def centred(dt: float, x: float, state: State, p: State) -> float:
+    """Probe side, from x − gap/2 (pushing) to x + gap/2; p = (gap, start)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[1] = x + p[0] * (p[1] - 0.5)
+    state[1] = min(max(state[1], x - 0.5 * p[0]), x + 0.5 * p[0])
+    return state[1]
+
+
+@block
+def gradual(dt: float, x: float, state: State, p: State) -> float:
+    """Mean of four plays from x to x + gap (1 ± spread); p = (gap, spread, start)."""
+    result = 0.0
+    for i in range(4):
+        gap = p[0] * (1.0 + p[1] * (i - 1.5) / 1.5)
+        if state[_STARTED] == 0.0:
+            state[1 + i] = x + gap * p[2]
+        state[1 + i] = min(max(state[1 + i], x), x + gap)
+        result += 0.25 * state[1 + i]
+    state[_STARTED] = 1.0
+    return result
+
+
+@block
+def loaded(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection of a joint that force closes; p = (gap, closing_force)."""
+    closed = -math.expm1(-abs(force) / p[1])
+    return p[0] * closed if force >= 0.0 else -p[0] * closed
+
+
+_GAP = Parameter(
+    "gap",
+    "mm",
+    0.0,
+    5.0,
+    0.03,
+    "full width of the play",
+    required=True,
+    amplitude=True,
+    floor=("position_noise_mm", 2.0),
+    starts=(0.01, 0.05),
+)
+_START = Parameter("start", "1", 0.0, 1.0, 0.0, "where in the play the data begin (0: pushing side)", fixed=True)
+
+EFFECT = Effect(
+    id="backlash",
+    what="Play between motor and probe: the probe stays behind at each reversal.",
+    says="there is {gap:.4g} mm of play between motor and probe",
+    check="tighten couplings, thread and probe holder; preload the play away with a spring",
+    reference="Nordin, Gutman, Automatica 38, 2002, 1633-1649",
+    forms=(
+        Form(
+            name="play",
+            what="rigid stops; no offset while pushing",
+            parameters=(_GAP, _START),
+            blocks={"play": play},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="centred",
+            what="rigid stops; half the gap to either side",
+            parameters=(_GAP, _START),
+            blocks={"play": centred},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="gradual",
+            what="the gap closes by and by",
+            parameters=(
+                _GAP,
+                Parameter("spread", "1", 0.0, 1.0, 0.6, "how much the gaps of its parts differ", starts=(0.3, 0.8)),
+                _START,
+            ),
+            blocks={"play": gradual},
+            state=(0.0,) * 5,
+        ),
+        Form(
+            name="loaded",
+            what="the force itself closes the gap",
+            parameters=(
+                _GAP,
+                Parameter(
+                    "closing_force", "N", 1e-3, 100.0, 0.2, "force at which 1/e of the gap is left", starts=(0.1, 1.0)
+                ),
+            ),
+            blocks={"frame": loaded},
+        ),
+    ),
+)

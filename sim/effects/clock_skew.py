@@ -1,0 +1,81 @@
+"""Clock skew: the clock that stamps the forces runs at another rate than the one that stamps the positions.
+
+Over the time T since the first force sample the force clock counts T (1 + skew · 10⁻⁶).
+
+- `linear`: the clocks agree at the first force sample.
+- `offset`: there they differ by `offset` already (force clock ahead). Without a skew it is a delay.
+- `ageing`: the skew grows by itself over `doubling` seconds, as a quartz that warms up.
+
+A single stamp without an array around it (a simulated device that is read out) counts from time 0.
+
+Reference: D. L. Mills, Internet time synchronization: the network time protocol, IEEE Trans. Commun. 39, 1991,
+1482–1493 (offset, skew and drift of a clock).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from sim.effects.base import Array, Effect, Form, Parameter
+
+
+def _origin(stamp_s: Array) -> float:
+    return float(stamp_s.flat[0]) if stamp_s.ndim and stamp_s.size else 0.0
+
+
+def skewed(values: Mapping[str, float], stamp_s: Array) -> Array:
+    """When forces stamped `stamp_s` were felt, s."""
+    origin = _origin(stamp_s)
+    return np.asarray(origin - values.get("offset", 0.0) + (stamp_s - origin) / (1.0 + 1e-6 * values["skew"]))
+
+
+def ageing(values: Mapping[str, float], stamp_s: Array) -> Array:
+    """When forces stamped `stamp_s` were felt, s."""
+    origin = _origin(stamp_s)
+    since = stamp_s - origin
+    gained = 1e-6 * values["skew"] * since * (1.0 + 0.5 * since / values["doubling"])
+    return np.asarray(stamp_s - gained)
+
+
+_SKEW = Parameter(
+    "skew",
+    "ppm",
+    -2e4,
+    2e4,
+    100.0,
+    "rate of the force clock minus that of the position clock",
+    required=True,
+    amplitude=True,
+    starts=(-300.0, 300.0),
+)
+
+EFFECT = Effect(
+    id="clock_skew",
+    what="The clocks of force and position run at different rates.",
+    says="the force clock gains {skew:.4g} microseconds a second on the position clock",
+    check="stamp both channels with one clock, or let a common event mark both at start and end",
+    reference="Mills, IEEE Trans. Commun. 39, 1991, 1482-1493",
+    forms=(
+        Form(name="linear", what="equal at the first sample", parameters=(_SKEW,), time_shift=skewed),
+        Form(
+            name="offset",
+            what="apart at the first sample already",
+            parameters=(
+                _SKEW,
+                Parameter("offset", "s", -1.0, 1.0, 0.0, "force clock minus position clock at the first force sample"),
+            ),
+            time_shift=skewed,
+        ),
+        Form(
+            name="ageing",
+            what="ever further apart",
+            parameters=(
+                _SKEW,
+                Parameter("doubling", "s", 10.0, 1e6, 100.0, "time in which the skew doubles", starts=(30.0, 300.0)),
+            ),
+            time_shift=ageing,
+        ),
+    ),
+)

@@ -1,0 +1,83 @@
+"""Cogging: a force periodic in position, as the magnets of a linear motor pull on its iron; felt by the cell.
+
+- `sine`: amplitude · sin(2π y/period + phase).
+- `harmonics`: with a second harmonic, ratio · amplitude.
+
+Reference: J. F. Gieras, Z. J. Piech, B. Z. Tomczuk, Linear Synchronous Motors: Transportation and Automation Systems,
+2nd ed., CRC Press, 2012 (cogging and detent force).
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+
+@block
+def sine(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase)."""
+    return p[0] * math.sin(2.0 * math.pi * y / p[1] + p[2])
+
+
+@block
+def harmonics(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, ratio, second_phase)."""
+    angle = 2.0 * math.pi * y / p[1]
+    return p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(2.0 * angle + p[4]))
+
+
+def _phase(name: str, what: str) -> Parameter:
+    return Parameter(name, "rad", -10.0, 10.0, 0.0, what, starts=(0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi))
+
+
+_AMPLITUDE = Parameter(
+    "amplitude",
+    "N",
+    0.0,
+    100.0,
+    0.05,
+    "force at the crest",
+    required=True,
+    amplitude=True,
+    floor=("force_noise_N", 0.3),
+)
+_PERIOD = Parameter(
+    "period",
+    "mm",
+    0.02,
+    200.0,
+    1.0,
+    "distance after which the force repeats",
+    required=True,
+    starts=(0.15, 0.25, 0.4, 0.6, 0.85, 1.2, 1.7, 2.5, 4.0, 8.0),
+)
+
+EFFECT = Effect(
+    id="cogging",
+    what="A force periodic in position, from magnets or a thread, is felt by the cell.",
+    says="a force of {amplitude:.4g} N repeats every {period:.4g} mm of position",
+    check="move slowly through free air over several periods; the ripple is there without a pad",
+    reference="Gieras, Piech, Tomczuk, Linear Synchronous Motors, 2nd ed., 2012",
+    forms=(
+        Form(
+            name="sine",
+            what="one sine",
+            parameters=(_AMPLITUDE, _PERIOD, _phase("phase", "phase at position 0")),
+            blocks={"probe": sine},
+        ),
+        Form(
+            name="harmonics",
+            what="a sine and its second harmonic",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                _phase("phase", "phase at position 0"),
+                Parameter("ratio", "1", 0.0, 3.0, 0.5, "second harmonic over the first"),
+                _phase("second_phase", "phase of the second harmonic at position 0"),
+            ),
+            blocks={"probe": harmonics},
+        ),
+    ),
+)

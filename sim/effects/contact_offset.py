@@ -1,0 +1,79 @@
+"""Contact offset: the true surface lies elsewhere than where touch-off has put it.
+
+- `constant`: depth = position − offset.
+- `toe`: seating. The first part of the way takes up slack, tilt and roughness: δ = y²/(4·offset) up to y = 2·offset,
+  then y − offset; ASTM D695 and D638 call this the toe of the curve and correct for the same offset.
+
+With an exponential law a constant offset is exactly another m, and with a polynomial another polynomial.
+
+Reference: D. C. Lin, E. K. Dimitriadis, F. Horkay, Robust strategies for automated AFM force curve analysis I,
+J. Biomech. Eng. 129, 2007, 430–440, on how the point of contact and the stiffness stand in for each other.
+"""
+
+from __future__ import annotations
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+
+@block
+def constant(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the true surface; p = (offset,)."""
+    return y - p[0]
+
+
+@block
+def toe(dt: float, y: float, state: State, p: State) -> float:
+    """Depth after a parabola of length 2·offset; p = (offset,)."""
+    if y <= 0.0 or p[0] <= 0.0:
+        return y
+    if y < 2.0 * p[0]:
+        return y * y / (4.0 * p[0])
+    return y - p[0]
+
+
+EFFECT = Effect(
+    id="contact_offset",
+    what="The true surface is not where touch-off has put it.",
+    says="the surface lies {offset:.4g} mm deeper than touch-off found it",
+    check="repeat the touch-off, slower and with a smaller force; look for dust or tilt under the probe",
+    reference="Lin, Dimitriadis, Horkay, J. Biomech. Eng. 129, 2007, 430-440",
+    forms=(
+        Form(
+            name="constant",
+            what="all depths are off by the same",
+            parameters=(
+                Parameter(
+                    "offset",
+                    "mm",
+                    -5.0,
+                    5.0,
+                    0.05,
+                    "true surface minus believed surface",
+                    required=True,
+                    amplitude=True,
+                    floor=("position_noise_mm", 2.0),
+                ),
+            ),
+            blocks={"depth": constant},
+        ),
+        Form(
+            name="toe",
+            what="a soft beginning: the offset is lost over the first part of the way",
+            parameters=(
+                Parameter(
+                    "offset",
+                    "mm",
+                    0.0,
+                    5.0,
+                    0.05,
+                    "way lost before contact is whole",
+                    required=True,
+                    amplitude=True,
+                    floor=("position_noise_mm", 2.0),
+                ),
+            ),
+            blocks={"depth": toe},
+        ),
+    ),
+)

@@ -1,0 +1,131 @@
+"""Damage: the pad gets softer with all the way it has been loaded, for good, at whatever depth.
+
+Travel is the sum of all depth gained while loading. Positions come with noise, which would add up: a gain counts once
+it exceeds a dead band (`dead_band`, a choice and not fitted).
+
+- `exponential`: floor + (1 − floor) e^(−rate · travel).
+- `hyperbolic`: 1/(1 + rate · travel), which slows down.
+- `linear`: 1 − rate · travel, down to 0.02.
+- `energy`: exponential in Σ Δ(δ^(n+1))/(n+1), the work of a spring F ∝ δ^n: deep travel counts more. `rate` is per mm
+  of travel at 1 mm of depth.
+
+Reference: J. Lemaitre, A Course on Damage Mechanics, 2nd ed., Springer, 1996
+(accumulated strain and energy as measures).
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+_LAST, _TRAVEL = range(2)
+_LEAST = 0.02
+
+
+@block
+def exponential(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, floor, dead_band)."""
+    here = max(depth, 0.0)
+    gained = here - p[2] - state[_LAST]
+    if gained > 0.0:
+        state[_TRAVEL] += gained
+        state[_LAST] += gained
+    state[_LAST] = min(state[_LAST], here)
+    return p[1] + (1.0 - p[1]) * math.exp(-p[0] * state[_TRAVEL])
+
+
+@block
+def hyperbolic(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, dead_band)."""
+    here = max(depth, 0.0)
+    gained = here - p[1] - state[_LAST]
+    if gained > 0.0:
+        state[_TRAVEL] += gained
+        state[_LAST] += gained
+    state[_LAST] = min(state[_LAST], here)
+    return 1.0 / (1.0 + p[0] * state[_TRAVEL])
+
+
+@block
+def linear(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, dead_band)."""
+    here = max(depth, 0.0)
+    gained = here - p[1] - state[_LAST]
+    if gained > 0.0:
+        state[_TRAVEL] += gained
+        state[_LAST] += gained
+    state[_LAST] = min(state[_LAST], here)
+    return max(_LEAST, 1.0 - p[0] * state[_TRAVEL])
+
+
+@block
+def energy(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, exponent, floor, dead_band)."""
+    here = max(depth, 0.0)
+    gained = here - p[3] - state[_LAST]
+    if gained > 0.0:
+        n = p[1] + 1.0
+        state[_TRAVEL] += ((state[_LAST] + gained) ** n - state[_LAST] ** n) / n
+        state[_LAST] += gained
+    state[_LAST] = min(state[_LAST], here)
+    return p[2] + (1.0 - p[2]) * math.exp(-p[0] * state[_TRAVEL])
+
+
+_RATE = Parameter(
+    "rate",
+    "1/mm",
+    0.0,
+    10.0,
+    0.01,
+    "relative loss of stiffness per mm of loading travel",
+    required=True,
+    amplitude=True,
+    starts=(0.003, 0.03),
+)
+_FLOOR = Parameter("floor", "1", 0.0, 0.95, 0.0, "share of the stiffness that stays", starts=(0.0, 0.5))
+_DEAD_BAND = Parameter("dead_band", "mm", 0.0, 0.1, 0.004, "gain of depth that counts as noise", fixed=True)
+
+EFFECT = Effect(
+    id="damage",
+    what="The pad gets softer with all the way it has been loaded, for good.",
+    says="the pad loses {rate:.3g} of its stiffness per mm it is pressed in, over and over",
+    check="repeat one cycle many times; a pad that does not come to rest is worn out: take a new one",
+    reference="Lemaitre, A Course on Damage Mechanics, 2nd ed., 1996",
+    forms=(
+        Form(
+            name="exponential",
+            what="exponentially with loading travel, to a floor",
+            parameters=(_RATE, _FLOOR, _DEAD_BAND),
+            blocks={"elastic": exponential},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="hyperbolic",
+            what="ever slower with loading travel",
+            parameters=(_RATE, _DEAD_BAND),
+            blocks={"elastic": hyperbolic},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="linear",
+            what="in proportion to loading travel",
+            parameters=(_RATE, _DEAD_BAND),
+            blocks={"elastic": linear},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="energy",
+            what="exponentially with the work of loading",
+            parameters=(
+                _RATE,
+                Parameter("exponent", "1", 0.0, 5.0, 1.0, "power of depth that weights the travel", starts=(1.0, 2.0)),
+                _FLOOR,
+                _DEAD_BAND,
+            ),
+            blocks={"elastic": energy},
+            state=(0.0, 0.0),
+        ),
+    ),
+)

@@ -1,0 +1,71 @@
+"""Relaxation that depends on depth: all rates times one factor, a clock of the material's own.
+
+- `exponential`: e^(slope · δ).
+- `linear`: 1 + slope · δ, continued below 0.1 by an exponential so that no rate ever vanishes.
+- `hyperbolic`: time constants linear in depth: 1/(1 − slope · δ), continued above 10 as the others are below.
+
+All have the relative slope `slope` at the surface.
+
+Reference: R. A. Schapery, On the characterization of nonlinear viscoelastic materials, Polym. Eng. Sci. 9, 1969,
+295–310 (shift factor that depends on strain).
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+_LEAST = 0.1
+
+
+@block
+def linear(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on the rates; p = (slope,)."""
+    factor = 1.0 + p[0] * max(depth, 0.0)
+    return factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0))
+
+
+@block
+def exponential(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on the rates; p = (slope,)."""
+    return math.exp(min(max(p[0] * max(depth, 0.0), -50.0), 50.0))
+
+
+@block
+def hyperbolic(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on the rates; p = (slope,)."""
+    factor = 1.0 - p[0] * max(depth, 0.0)
+    return 1.0 / (factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0)))
+
+
+_SLOPE = Parameter(
+    "slope",
+    "1/mm",
+    -5.0,
+    5.0,
+    0.3,
+    "relative change of all rates per mm of depth, at the surface",
+    required=True,
+    amplitude=True,
+    starts=(-0.3, 0.3),
+)
+
+EFFECT = Effect(
+    id="depth_dependent_relaxation",
+    what="The pad relaxes faster or slower the deeper it is pressed.",
+    says="all relaxation rates change by {slope:.3g} of themselves per mm of depth",
+    check="hold at several depths for the same time; keep to the depths that matter and fit there",
+    reference="Schapery, Polym. Eng. Sci. 9, 1969, 295-310",
+    forms=(
+        Form(name="linear", what="rates linear in depth", parameters=(_SLOPE,), blocks={"rate": linear}),
+        Form(name="exponential", what="rates exponential in depth", parameters=(_SLOPE,), blocks={"rate": exponential}),
+        Form(
+            name="hyperbolic",
+            what="time constants linear in depth",
+            parameters=(_SLOPE,),
+            blocks={"rate": hyperbolic},
+        ),
+    ),
+)

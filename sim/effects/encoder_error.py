@@ -1,0 +1,96 @@
+"""Encoder error: the reported position is off by an error that repeats with the pitch of the scale.
+
+- `sine`: reported = true + amplitude · sin(2π true/period + phase).
+- `harmonics`: with a second harmonic, ratio · amplitude. Unequal offsets of the two quadrature signals make the first
+  harmonic, unequal gains and a phase other than 90° the second (P. L. M. Heydemann, Determination and correction of
+  quadrature fringe measurement errors in interferometers, Appl. Opt. 20, 1981, 3382–3384).
+
+A reported position must rise with the true one; an error so steep that it would not is taken as the steepest that does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+_STEEPEST = 0.9
+
+
+@block
+def sine(dt: float, x: float, state: State, p: State) -> float:
+    """Reported position; p = (amplitude, wave number, phase)."""
+    return x + p[0] * math.sin(p[1] * x + p[2])
+
+
+@block
+def harmonics(dt: float, x: float, state: State, p: State) -> float:
+    """Reported position; p = (amplitude, wave number, phase, ratio, second phase)."""
+    angle = p[1] * x
+    return x + p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(2.0 * angle + p[4]))
+
+
+def _packed(values: Mapping[str, float]) -> tuple[float, ...]:
+    wave_number = 2.0 * math.pi / values["period"]
+    ratio = values.get("ratio", 0.0)
+    amplitude = min(values["amplitude"], _STEEPEST / (wave_number * (1.0 + 2.0 * abs(ratio))))
+    return (amplitude, wave_number, values["phase"], ratio, values.get("second_phase", 0.0))
+
+
+def _phase(name: str, what: str) -> Parameter:
+    return Parameter(name, "rad", -10.0, 10.0, 0.0, what, starts=(0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi))
+
+
+_AMPLITUDE = Parameter(
+    "amplitude",
+    "mm",
+    0.0,
+    1.0,
+    0.005,
+    "greatest error",
+    required=True,
+    amplitude=True,
+    floor=("position_noise_mm", 0.5),
+)
+_PERIOD = Parameter(
+    "period",
+    "mm",
+    0.005,
+    200.0,
+    1.0,
+    "distance after which the error repeats",
+    required=True,
+    starts=(0.1, 0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0),
+)
+
+EFFECT = Effect(
+    id="encoder_error",
+    what="The reported position is off by an error that repeats with the pitch of the encoder.",
+    says="the encoder is off by up to {amplitude:.4g} mm, again every {period:.4g} mm",
+    check="compare with a dial gauge over one pitch of the scale; run the maker's encoder calibration",
+    reference="Heydemann, Appl. Opt. 20, 1981, 3382-3384",
+    forms=(
+        Form(
+            name="sine",
+            what="one sine",
+            parameters=(_AMPLITUDE, _PERIOD, _phase("phase", "phase at position 0")),
+            blocks={"report": sine},
+            pack=_packed,
+        ),
+        Form(
+            name="harmonics",
+            what="a sine and its second harmonic",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                _phase("phase", "phase at position 0"),
+                Parameter("ratio", "1", 0.0, 3.0, 0.5, "second harmonic over the first"),
+                _phase("second_phase", "phase of the second harmonic at position 0"),
+            ),
+            blocks={"report": harmonics},
+            pack=_packed,
+        ),
+    ),
+)

@@ -1,0 +1,87 @@
+"""Force drift: the zero of the force wanders with time, from the first sample on.
+
+From warming up, from creep of the cell's own spring and glue, from a cable that settles. `rate` is the rate at the
+first sample in all forms.
+
+- `linear`: rate · t.
+- `settling`: rate · τ (1 − e^(−t/τ)), one thermal time constant.
+- `root`: rate · 2τ (√(1 + t/τ) − 1), as heat that diffuses in.
+- `logarithmic`: rate · τ ln(1 + t/τ), as creep of glue and gauge.
+
+Reference: OIML R 60, Metrological regulation for load cells (creep, and temperature effect on the dead load output).
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+
+@block
+def linear(dt: float, force: float, state: State, p: State) -> float:
+    """State: time since the first sample; p = (rate,)."""
+    state[0] += dt
+    return force + p[0] * state[0]
+
+
+@block
+def settling(dt: float, force: float, state: State, p: State) -> float:
+    """Exponential to a limit; p = (rate, time_constant)."""
+    state[0] += dt
+    return force - p[0] * p[1] * math.expm1(-state[0] / p[1])
+
+
+@block
+def root(dt: float, force: float, state: State, p: State) -> float:
+    """Root of time in the end; p = (rate, time_constant)."""
+    state[0] += dt
+    return force + p[0] * 2.0 * p[1] * (math.sqrt(1.0 + state[0] / p[1]) - 1.0)
+
+
+@block
+def logarithmic(dt: float, force: float, state: State, p: State) -> float:
+    """Logarithm of time in the end; p = (rate, time_constant)."""
+    state[0] += dt
+    return force + p[0] * p[1] * math.log1p(state[0] / p[1])
+
+
+_RATE = Parameter("rate", "N/s", -100.0, 100.0, 0.002, "rate at the first sample", required=True, amplitude=True)
+
+
+def _time_constant(what: str) -> Parameter:
+    return Parameter("time_constant", "s", 0.05, 1e5, 30.0, what, starts=(3.0, 20.0, 120.0))
+
+
+EFFECT = Effect(
+    id="force_drift",
+    what="The zero of the force wanders with time.",
+    says="the force drifts by {rate:.4g} N per second at the start",
+    check="let the cell warm up, and keep some free air before and after the run",
+    reference="OIML R 60, Metrological regulation for load cells",
+    forms=(
+        Form(name="linear", what="steady", parameters=(_RATE,), blocks={"sensor": linear}, state=(0.0,)),
+        Form(
+            name="settling",
+            what="exponentially to a limit",
+            parameters=(_RATE, _time_constant("time in which the rate falls to 1/e")),
+            blocks={"sensor": settling},
+            state=(0.0,),
+        ),
+        Form(
+            name="root",
+            what="with the root of time in the end",
+            parameters=(_RATE, _time_constant("time from which the rate falls")),
+            blocks={"sensor": root},
+            state=(0.0,),
+        ),
+        Form(
+            name="logarithmic",
+            what="with the logarithm of time in the end",
+            parameters=(_RATE, _time_constant("time from which the rate falls")),
+            blocks={"sensor": logarithmic},
+            state=(0.0,),
+        ),
+    ),
+)

@@ -1,0 +1,128 @@
+"""Inertia: the cell accelerates the mass beyond it, and feels the force that takes.
+
+- `rigid`: mass · acceleration of the probe. The acceleration is the second divided difference of the positions,
+  extrapolated to the end of the step from the one before: on even steps (2, −5, 4, −1)/dt², Houbolt's scheme, of second
+  order and stable when solved with frame and pad (J. C. Houbolt, A recurrence matrix solution for the dynamic response
+  of elastic aircraft, J. Aeronaut. Sci. 17, 1950, 540–550). No lag where the acceleration changes steadily; a jump of
+  the acceleration is seen within two steps. Earlier positions are taken at least three quarters of `window` apart:
+  noise of position grows with 1/window², and stamps of two interleaved clocks come close together.
+- `damped`: mass · (acceleration + damping_rate · speed), a mass in oil or with a cable dragging.
+- `sprung`: the mass sits on a spring and damper of its own: natural frequency and damping ratio. Exact for an
+  acceleration that is constant over each step, and brings the speed of the last step to that of this one.
+
+`mass` in kg, positions in mm: the force is mass/1000 · mm/s².
+
+Reference: L. Meirovitch, Fundamentals of Vibrations, McGraw-Hill, 2001 (rigid and sprung mass under base motion).
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.effects.linear import swing
+from sim.jit import State, block
+
+_STARTED = 0
+_AGES = 1
+_PLACES = 5
+_KNOTS = 4
+_APART = 0.75
+_KG_MM = 1e-3
+"""N per kg mm/s²."""
+
+
+@block
+def rigid(dt: float, y: float, state: State, p: State) -> float:
+    """Force on the mass in N; p = (mass, damping_rate, window).
+
+    State: the last four knots, newest first: time since each, and position there.
+    """
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        for i in range(_KNOTS):  # at rest before the data
+            state[_AGES + i] = i * p[2]
+            state[_PLACES + i] = y
+    for i in range(_KNOTS):
+        state[_AGES + i] += dt
+    first = 0 if state[_AGES] >= _APART * p[2] else 1
+    p1, p2, p3 = state[_AGES + first], state[_AGES + first + 1], state[_AGES + first + 2]
+    y1, y2, y3 = state[_PLACES + first], state[_PLACES + first + 1], state[_PLACES + first + 2]
+    speed = (y - y1) / p1
+    before = (y1 - y2) / (p2 - p1)
+    earlier = (y2 - y3) / (p3 - p2)
+    newer = 2.0 * (speed - before) / p2  # a third of p1 + p2 ago
+    older = 2.0 * (before - earlier) / (p3 - p1)  # p3/3 earlier still
+    acceleration = newer + (newer - older) * min((p1 + p2) / p3, 1.5)
+    if state[_AGES] >= 0.999999 * p[2]:
+        for i in range(_KNOTS - 1, 0, -1):
+            state[_AGES + i] = state[_AGES + i - 1]
+            state[_PLACES + i] = state[_PLACES + i - 1]
+        state[_AGES] = 0.0
+        state[_PLACES] = y
+    return _KG_MM * p[0] * (acceleration + p[1] * (speed + 0.5 * p1 * newer))
+
+
+@block
+def sprung(dt: float, y: float, state: State, p: State) -> float:
+    """Force of spring and damper on the mass in N; p = (mass, frequency, damping_ratio).
+
+    State: started, y, speed of y, deflection and its speed.
+    """
+    if state[0] == 0.0:
+        state[0] = 1.0
+        state[1] = y
+    omega = 2.0 * math.pi * p[1]
+    if dt > 0.0:
+        speed = (y - state[1]) / dt
+        rest = (state[2] - speed) / (dt * omega * omega)  # deflection under the acceleration of this step
+        e, de = swing(dt, state[3] - rest, state[4], omega, p[2])
+        state[1] = y
+        state[2] = speed
+        state[3] = rest + e
+        state[4] = de
+    return -_KG_MM * p[0] * (omega * omega * state[3] + 2.0 * p[2] * omega * state[4])
+
+
+_MASS = Parameter("mass", "kg", 0.0, 50.0, 0.1, "mass beyond the cell", required=True, amplitude=True)
+_WINDOW = Parameter("window", "s", 1e-5, 0.1, 0.002, "least time over which acceleration is taken", fixed=True)
+
+EFFECT = Effect(
+    id="inertia",
+    what="The cell feels the force that accelerates the mass beyond it.",
+    says="a mass of {mass:.4g} kg beyond the cell is felt when the probe accelerates",
+    check="run the same moves in free air; weigh probe and adapter; lower the acceleration",
+    reference="Meirovitch, Fundamentals of Vibrations, 2001",
+    forms=(
+        Form(
+            name="rigid",
+            what="mass times acceleration",
+            parameters=(_MASS, _WINDOW),
+            blocks={"probe": rigid},
+            state=(0.0,) * 9,
+            pack=lambda values: (values["mass"], 0.0, values["window"]),
+        ),
+        Form(
+            name="damped",
+            what="mass times acceleration, and drag in proportion to speed",
+            parameters=(
+                _MASS,
+                Parameter("damping_rate", "1/s", 0.0, 1e4, 10.0, "drag over mass and speed", starts=(5.0, 50.0)),
+                _WINDOW,
+            ),
+            blocks={"probe": rigid},
+            state=(0.0,) * 9,
+        ),
+        Form(
+            name="sprung",
+            what="the mass swings on a spring of its own",
+            parameters=(
+                _MASS,
+                Parameter("frequency", "Hz", 1.0, 2000.0, 80.0, "natural frequency", starts=(20.0, 50.0, 120.0, 300.0)),
+                Parameter("damping_ratio", "1", 1e-3, 0.95, 0.3, "damping over critical damping", starts=(0.05, 0.5)),
+            ),
+            blocks={"probe": sprung},
+            state=(0.0,) * 5,
+        ),
+    ),
+)

@@ -1,0 +1,31 @@
+"""Exact steps of linear second-order systems, for the blocks of several effects. No effect itself."""
+
+from __future__ import annotations
+
+import math
+
+from sim.jit import compiled
+
+
+@compiled("UniTuple(float64, 2)(float64, float64, float64, float64, float64)")
+def swing(dt: float, e: float, de: float, omega: float, damping: float) -> tuple[float, float]:
+    """e and its derivative after dt of e'' + 2ζω e' + ω² e = 0, for a damping ratio ζ below 1."""
+    decay = damping * omega
+    omega_d = omega * math.sqrt(1.0 - damping * damping)
+    fade = math.exp(-decay * dt)
+    c = math.cos(omega_d * dt)
+    s = math.sin(omega_d * dt) / omega_d
+    return fade * (e * c + (de + decay * e) * s), fade * (de * c - (omega * omega * e + decay * de) * s)
+
+
+@compiled("UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64, float64)")
+def low_pass(
+    dt: float, y: float, v: float, before: float, u: float, omega: float, damping: float
+) -> tuple[float, float]:
+    """Output y and its derivative v of ω²/(s² + 2ζω s + ω²), the input going linearly from `before` to `u` in dt."""
+    if dt <= 0.0:
+        return y, v
+    slope = (u - before) / dt
+    lag = 2.0 * damping * slope / omega
+    e, de = swing(dt, y - before + lag, v - slope, omega, damping)
+    return u - lag + e, slope + de

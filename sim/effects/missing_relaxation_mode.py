@@ -1,0 +1,124 @@
+"""A missing relaxation mode: the pad relaxes on a time scale that the believed model does not have.
+
+The mode takes its share from c_0, the part that never relaxes, as a fit with one more mode would. Where c_0 is not
+enough, the believed modes give way too, in proportion: c_0 is then 0.
+
+- `exponential`: share · e^(−rate t).
+- `stretched`: share · e^(−(rate t)^β), Kohlrausch's law (G. Williams, D. C. Watts, Trans. Faraday Soc. 66, 1970,
+  80–85), as ten modes. Their rates are quantiles of the one-sided stable law of which e^(−t^β) is the Laplace
+  transform (V. M. Zolotarev, One-dimensional Stable Distributions, AMS, 1986), so they move smoothly with β.
+- `box`: a spectrum even in the logarithm of the rate, `decades` wide, as ten modes (Y. C. Fung, Biomechanics:
+  Mechanical Properties of Living Tissues, 2nd ed., Springer, 1993, chapter 7).
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sim.effects.base import Effect, Form, Parameter
+
+if TYPE_CHECKING:
+    from sim.pad import Pad
+
+NODES = 10
+
+
+def _with_modes(pad: Pad, shares: Sequence[float], rates: Sequence[float]) -> Pad:
+    from sim.relaxation import Relaxation
+
+    added, old = math.fsum(shares), math.fsum(pad.relaxation.shares)
+    keep = 1.0 if old + added <= 1.0 or old == 0.0 else max(0.0, 1.0 - added) / old
+    both = [(c * keep, nu) for c, nu in zip(pad.relaxation.shares, pad.relaxation.rates, strict=True)]
+    both += zip(shares, rates, strict=True)
+    both.sort(key=lambda mode: -mode[1])
+    return replace(pad, relaxation=Relaxation(tuple(c for c, _ in both), tuple(nu for _, nu in both)))
+
+
+def _exponential(pad: Pad, values: Mapping[str, float]) -> Pad:
+    return _with_modes(pad, [values["share"]], [values["rate"]])
+
+
+@functools.lru_cache(maxsize=64)
+def _stretched_rates(beta: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Weights and rates of modes that add up to e^(−t^β): Gauss's nodes in the probability of the rate."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    if beta >= 1.0 - 1e-9:
+        return tuple(0.5 * weights), (1.0,) * NODES
+    angle_nodes, angle_weights = np.polynomial.legendre.leggauss(200)
+    angle = 0.5 * math.pi * (1.0 + angle_nodes)
+    log_a = (
+        beta / (1.0 - beta) * np.log(np.sin(beta * angle))
+        + np.log(np.sin((1.0 - beta) * angle))
+        - np.log(np.sin(angle)) / (1.0 - beta)
+    )
+    wanted = 0.5 * (1.0 + nodes)
+    low, high = np.full(NODES, -60.0), np.full(NODES, 60.0)
+    for _ in range(60):  # P(rate < k) = mean of exp(−k^(−β/(1−β)) a(angle)) rises with k
+        middle = 0.5 * (low + high)
+        exponent = np.minimum(log_a - beta / (1.0 - beta) * middle[:, None], 600.0)
+        below = np.exp(-np.exp(exponent)) @ (0.5 * angle_weights) < wanted
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return tuple(0.5 * weights), tuple(np.exp(0.5 * (low + high)))
+
+
+def _stretched(pad: Pad, values: Mapping[str, float]) -> Pad:
+    weights, rates = _stretched_rates(values["stretch"])
+    return _with_modes(pad, [values["share"] * w for w in weights], [values["rate"] * k for k in rates])
+
+
+def _box(pad: Pad, values: Mapping[str, float]) -> Pad:
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    rates = values["rate"] * 10.0 ** (0.5 * values["decades"] * nodes)
+    return _with_modes(pad, [float(values["share"] * 0.5 * w) for w in weights], [float(k) for k in rates])
+
+
+_SHARE = Parameter(
+    "share", "1", 0.0, 1.0, 0.1, "share of the force that relaxes in this way", required=True, amplitude=True
+)
+_RATE = Parameter(
+    "rate",
+    "1/s",
+    1e-4,
+    1e4,
+    1.0,
+    "how fast: 1/rate is the time to 1/e",
+    required=True,
+    starts=(0.01, 0.05, 0.3, 1.5, 8.0, 40.0, 200.0),
+)
+
+EFFECT = Effect(
+    id="missing_relaxation_mode",
+    what="The pad relaxes on a time scale that the model does not have.",
+    says="a share of {share:.4g} of the force relaxes at a rate of {rate:.4g} per second, which the model lacks",
+    check="fit with one more mode; hold longer for slow ones, ramp faster for fast ones",
+    reference="Williams, Watts, Trans. Faraday Soc. 66, 1970, 80-85; Fung, Biomechanics, 2nd ed., 1993",
+    forms=(
+        Form(name="exponential", what="one more mode", parameters=(_SHARE, _RATE), amend=_exponential),
+        Form(
+            name="stretched",
+            what="a stretched exponential (Kohlrausch)",
+            parameters=(
+                _SHARE,
+                _RATE,
+                Parameter("stretch", "1", 0.2, 1.0, 0.5, "exponent of time", starts=(0.35, 0.6)),
+            ),
+            amend=_stretched,
+        ),
+        Form(
+            name="box",
+            what="evenly over a span of rates (Fung)",
+            parameters=(
+                _SHARE,
+                _RATE,
+                Parameter("decades", "1", 0.1, 6.0, 2.0, "width of the span in powers of ten", starts=(1.0, 3.0)),
+            ),
+            amend=_box,
+        ),
+    ),
+)

@@ -1,0 +1,112 @@
+"""Permanent set: the surface sinks with the depth reached, and does not come back.
+
+- `linear`: by set · deepest.
+- `power`: by set · deepest^n, progressive above n = 1.
+- `yielding`: by set · (deepest − limit), once the deepest exceeds the limit.
+- `gradual`: towards set · deepest at a rate in time, only while pressed (the rate is scaled by depth/deepest).
+
+`deepest` is in the probe's coordinate; the pad's depth is what is left above the sunken surface.
+
+Reference: L. Mullins, Softening of rubber by deformation, Rubber Chem. Technol. 42, 1969, 339–362 (set as part of the
+softening); ISO 1856, Flexible cellular polymeric materials: determination of compression set.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+_DEEPEST, _SUNK = range(2)
+
+
+@block
+def linear(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the sunken surface; p = (set,)."""
+    state[_DEEPEST] = max(state[_DEEPEST], y)
+    return y - p[0] * state[_DEEPEST]
+
+
+@block
+def power(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the sunken surface; p = (set, exponent)."""
+    state[_DEEPEST] = max(state[_DEEPEST], y)
+    return float(y - min(p[0] * state[_DEEPEST] ** p[1], state[_DEEPEST]))
+
+
+@block
+def yielding(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the sunken surface; p = (set, limit)."""
+    state[_DEEPEST] = max(state[_DEEPEST], y)
+    return y - p[0] * max(0.0, state[_DEEPEST] - p[1])
+
+
+@block
+def gradual(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the sinking surface; p = (set, rate)."""
+    state[_DEEPEST] = max(state[_DEEPEST], y)
+    if state[_DEEPEST] > 0.0:
+        pressed = min(max(y / state[_DEEPEST], 0.0), 1.0)
+        state[_SUNK] -= (p[0] * state[_DEEPEST] - state[_SUNK]) * math.expm1(-p[1] * pressed * dt)
+    return y - state[_SUNK]
+
+
+_SET = Parameter(
+    "set",
+    "mm/mm",
+    0.0,
+    0.95,
+    0.05,
+    "how far the surface sinks, per mm of depth reached",
+    required=True,
+    amplitude=True,
+    starts=(0.02, 0.1),
+)
+
+EFFECT = Effect(
+    id="permanent_set",
+    what="The surface sinks with the depth reached, for good.",
+    says="the surface sinks by {set:.4g} mm per mm of depth reached",
+    check="come back to the surface between presses; measure its height before and after the run",
+    reference="Mullins, Rubber Chem. Technol. 42, 1969, 339-362; ISO 1856",
+    forms=(
+        Form(
+            name="linear",
+            what="at once, in proportion to the deepest depth",
+            parameters=(_SET,),
+            blocks={"depth": linear},
+            state=(0.0,),
+        ),
+        Form(
+            name="power",
+            what="at once, with a power of the deepest depth",
+            parameters=(
+                _SET,
+                Parameter("exponent", "1", 0.2, 5.0, 1.5, "power of the deepest depth in mm", starts=(0.7, 1.5, 2.5)),
+            ),
+            blocks={"depth": power},
+            state=(0.0,),
+        ),
+        Form(
+            name="yielding",
+            what="at once, beyond a depth that leaves no trace",
+            parameters=(
+                _SET,
+                Parameter("limit", "mm", 0.0, 50.0, 0.5, "depth that leaves no trace", starts=(0.3, 1.0, 2.0)),
+            ),
+            blocks={"depth": yielding},
+            state=(0.0,),
+        ),
+        Form(
+            name="gradual",
+            what="in time, while pressed",
+            parameters=(
+                _SET,
+                Parameter("rate", "1/s", 1e-4, 1e3, 0.5, "rate of the approach", starts=(0.02, 0.2, 2.0)),
+            ),
+            blocks={"depth": gradual},
+            state=(0.0, 0.0),
+        ),
+    ),
+)

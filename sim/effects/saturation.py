@@ -1,0 +1,61 @@
+"""Saturation: the reported force ends at a limit.
+
+- `hard`: at ±limit.
+- `upper`: at +limit alone.
+- `soft`: a knee, u/(1 + |u/limit|^sharpness)^(1/sharpness): an amplifier near its rails.
+
+Reference: H. K. Khalil, Nonlinear Systems, 3rd ed., Prentice Hall, 2002, section 1.2 (common nonlinearities).
+"""
+
+from __future__ import annotations
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+
+@block
+def hard(dt: float, force: float, state: State, p: State) -> float:
+    """Between −limit and +limit; p = (limit,)."""
+    return max(-p[0], min(p[0], force))
+
+
+@block
+def upper(dt: float, force: float, state: State, p: State) -> float:
+    """No more than +limit; p = (limit,)."""
+    return min(p[0], force)
+
+
+@block
+def soft(dt: float, force: float, state: State, p: State) -> float:
+    """Towards ±limit with a knee; p = (limit, sharpness)."""
+    ratio = abs(force) / p[0]
+    if ratio <= 1.0:
+        return float(force / (1.0 + ratio ** p[1]) ** (1.0 / p[1]))
+    end = p[0] if force > 0.0 else -p[0]
+    return float(end / (1.0 + ratio ** -p[1]) ** (1.0 / p[1]))
+
+
+_LIMIT = Parameter(
+    "limit", "N", 1e-3, 1e5, 8.0, "greatest force reported", required=True, starts=(1.0, 2.0, 4.0, 8.0, 16.0)
+)
+
+EFFECT = Effect(
+    id="saturation",
+    what="The reported force ends at a limit.",
+    says="the force channel ends at {limit:.4g} N",
+    check="raise the amplifier's range, or take a cell of greater capacity; never press on beyond it",
+    reference="Khalil, Nonlinear Systems, 3rd ed., 2002, section 1.2",
+    forms=(
+        Form(name="hard", what="on both sides", parameters=(_LIMIT,), blocks={"sampling": hard}),
+        Form(name="upper", what="in compression alone", parameters=(_LIMIT,), blocks={"sampling": upper}),
+        Form(
+            name="soft",
+            what="with a knee",
+            parameters=(
+                _LIMIT,
+                Parameter("sharpness", "1", 1.0, 60.0, 8.0, "sharpness of the knee", starts=(3.0, 20.0)),
+            ),
+            blocks={"sampling": soft},
+        ),
+    ),
+)

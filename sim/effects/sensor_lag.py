@@ -1,0 +1,180 @@
+"""Sensor lag: a low-pass in the force path, as amplifiers and load cells have.
+
+In all forms `time_constant` is how far the output comes behind a ramp in the end, so that a change of form keeps its
+value. Each is exact for a force that is linear between samples, at any spacing.
+
+- `first_order`: 1/(1 + τs).
+- `two_poles`: critically damped, 1/(1 + τs/2)².
+- `butterworth`: second order without a peak, damping ratio 1/√2, ω = √2/τ.
+- `moving_average`: the mean over the last 2τ.
+
+Reference: E. O. Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3 (first
+and second order instruments and their response to a ramp).
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.effects.linear import low_pass
+from sim.jit import State, block
+from sim.kernel import ramp_gain
+
+_Y, _LAST, _STARTED, _Y2 = range(4)
+
+
+@block
+def first_order(dt: float, u: float, state: State, p: State) -> float:
+    """τ y' = u − y; p = (time_constant,)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+    elif dt > 0.0:
+        x = dt / p[0]
+        gain = ramp_gain(x)
+        decay = 1.0 - x * gain
+        state[_Y] = decay * state[_Y] + (gain - decay) * state[_LAST] + (1.0 - gain) * u
+    state[_LAST] = u
+    return state[_Y]
+
+
+@block
+def two_poles(dt: float, u: float, state: State, p: State) -> float:
+    """Two first-order lags of τ/2 in a row; p = (time_constant,)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_Y2] = u
+    elif dt > 0.0:
+        x = 2.0 * dt / p[0]
+        decay = math.exp(-x)
+        lag = (u - state[_LAST]) / x  # behind the ramp, after each of the two
+        one = state[_Y] - state[_LAST] + lag
+        two = state[_Y2] - state[_LAST] + 2.0 * lag
+        state[_Y] = u - lag + one * decay
+        state[_Y2] = u - 2.0 * lag + (two + one * x) * decay
+    state[_LAST] = u
+    return state[_Y2]
+
+
+@block
+def butterworth(dt: float, u: float, state: State, p: State) -> float:
+    """Second order with damping ratio 1/√2; p = (time_constant,)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_Y2] = 0.0
+    else:
+        omega = math.sqrt(2.0) / p[0]
+        y, v = low_pass(dt, state[_Y], state[_Y2], state[_LAST], u, omega, math.sqrt(0.5))
+        state[_Y] = y
+        state[_Y2] = v
+    state[_LAST] = u
+    return state[_Y]
+
+
+# moving average: the integral of the force at knots in a ring; (age of the newest, integral, force, time) …
+_AGE, _TOTAL, _FORCE, _NOW, _FIRST, _COUNT, _TAIL = range(7)
+_RING = 7
+KNOTS = 256
+_PER_WINDOW = 200
+
+
+@block
+def moving_average(dt: float, u: float, state: State, p: State) -> float:
+    """Mean over the last 2τ; p = (time_constant,).
+
+    Knots (time, integral, force) stand at every sample, or where samples are closer than a 200th of the window, at
+    that distance. Between knots the force is taken as linear.
+    """
+    width = 2.0 * p[0]
+    if state[_COUNT] == 0.0:
+        state[_FIRST] = u
+        state[_TOTAL] = 0.0
+        state[_NOW] = 0.0
+    else:
+        state[_NOW] += dt
+        state[_TOTAL] += 0.5 * dt * (state[_FORCE] + u)
+    state[_FORCE] = u
+    now = state[_NOW]
+    count = int(state[_COUNT])
+    newest = _RING + 3 * ((count - 1) % KNOTS)
+    if count == 0 or now - state[newest] >= width / _PER_WINDOW or dt <= 0.0:
+        slot = _RING + 3 * (count % KNOTS)
+        state[slot] = now
+        state[slot + 1] = state[_TOTAL]
+        state[slot + 2] = u
+        state[_COUNT] += 1.0
+        count += 1
+    if width <= 0.0:
+        return u
+    start = now - width
+    if start <= 0.0:  # before the data the force was the first one
+        return (state[_TOTAL] - start * state[_FIRST]) / width
+    tail = max(int(state[_TAIL]), count - KNOTS)
+    while tail + 1 < count and state[_RING + 3 * ((tail + 1) % KNOTS)] <= start:
+        tail += 1
+    state[_TAIL] = float(tail)
+    low = _RING + 3 * (tail % KNOTS)
+    if tail + 1 < count:
+        high = _RING + 3 * ((tail + 1) % KNOTS)
+        then, force = state[high], state[high + 2]
+    else:
+        then, force = now, u
+    into = start - state[low]
+    slope = (force - state[low + 2]) / (then - state[low]) if then > state[low] else 0.0
+    before = state[low + 1] + into * (state[low + 2] + 0.5 * slope * into)
+    return (state[_TOTAL] - before) / width
+
+
+_TIME_CONSTANT = Parameter(
+    "time_constant",
+    "s",
+    0.0,
+    1.0,
+    0.01,
+    "how far the reported force comes behind a ramp",
+    required=True,
+    amplitude=True,
+    floor=("sample_s", 0.15),
+    starts=(0.002, 0.01, 0.05),
+)
+
+EFFECT = Effect(
+    id="sensor_lag",
+    what="A low-pass in the force path smooths the force and lets it come late.",
+    says="the force path smooths with a time constant of {time_constant:.4g} s",
+    check="widen the filter of the load-cell amplifier, or note its setting and keep it",
+    reference="Doebelin, Measurement Systems, 4th ed., 1990, chapter 3",
+    forms=(
+        Form(
+            name="first_order",
+            what="one pole",
+            parameters=(_TIME_CONSTANT,),
+            blocks={"sensor": first_order},
+            state=(0.0,) * 3,
+        ),
+        Form(
+            name="two_poles",
+            what="two equal poles, critically damped",
+            parameters=(_TIME_CONSTANT,),
+            blocks={"sensor": two_poles},
+            state=(0.0,) * 4,
+        ),
+        Form(
+            name="butterworth",
+            what="second order, as flat as can be",
+            parameters=(_TIME_CONSTANT,),
+            blocks={"sensor": butterworth},
+            state=(0.0,) * 4,
+        ),
+        Form(
+            name="moving_average",
+            what="mean over a window of twice the time constant",
+            parameters=(_TIME_CONSTANT,),
+            blocks={"sensor": moving_average},
+            state=(0.0,) * (_RING + 3 * KNOTS),
+        ),
+    ),
+)

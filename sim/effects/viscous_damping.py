@@ -1,0 +1,112 @@
+"""Viscous damping of the pad: force against the speed of its surface, on top of relaxation, while in contact.
+
+Speed is that of the surface over the step, as positions are linear between samples. All forms oppose the motion, so
+they only ever take energy.
+
+- `linear`: coefficient · v, Kelvin and Voigt's dashpot.
+- `hunt_crossley`: coefficient · δ^n v, which starts at 0 at touch as measured impacts do (K. H. Hunt, F. R. E.
+  Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42, 1975, 440–445).
+- `with_stiffness`: coefficient · e^(aδ) v, damping in proportion to a stiffness that grows exponentially.
+- `power`: coefficient · v (v² + v_0²)^((n−1)/2): shear thinning below n = 1, linear under v_0 = 0.05 mm/s.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sim.effects.base import Effect, Form, Parameter
+from sim.jit import State, block
+
+_SLOW = 0.05
+"""Speed below which `power` is linear, mm/s: a root has no slope at rest."""
+
+
+@block
+def linear(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot; p = (coefficient,)."""
+    moved = max(depth, 0.0) - max(state[0], 0.0)
+    state[0] = depth
+    return p[0] * moved / dt if dt > 0.0 else 0.0
+
+
+@block
+def hunt_crossley(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot that grows with depth; p = (coefficient, exponent)."""
+    moved = max(depth, 0.0) - max(state[0], 0.0)
+    state[0] = depth
+    if dt <= 0.0 or depth <= 0.0:
+        return 0.0
+    return float(p[0] * depth ** p[1] * moved / dt)
+
+
+@block
+def with_stiffness(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot that grows exponentially with depth; p = (coefficient, growth)."""
+    moved = max(depth, 0.0) - max(state[0], 0.0)
+    state[0] = depth
+    return p[0] * math.exp(p[1] * max(depth, 0.0)) * moved / dt if dt > 0.0 else 0.0
+
+
+@block
+def power(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot that depends on speed; p = (coefficient, exponent)."""
+    moved = max(depth, 0.0) - max(state[0], 0.0)
+    state[0] = depth
+    if dt <= 0.0:
+        return 0.0
+    speed = moved / dt
+    return float(p[0] * speed * (speed * speed + _SLOW * _SLOW) ** (0.5 * (p[1] - 1.0)))
+
+
+def _coefficient(what: str) -> Parameter:
+    return Parameter(
+        "coefficient", "N*s/mm", 0.0, 100.0, 0.005, what, required=True, amplitude=True, starts=(0.002, 0.02)
+    )
+
+
+EFFECT = Effect(
+    id="viscous_damping",
+    what="The pad resists the speed at which it is pressed.",
+    says="the pad adds {coefficient:.4g} N per mm/s of speed while in contact",
+    check="press to one depth at several speeds; the fastest relaxation mode may be slower than what is seen",
+    reference="Hunt, Crossley, J. Appl. Mech. 42, 1975, 440-445",
+    forms=(
+        Form(
+            name="linear",
+            what="in proportion to speed",
+            parameters=(_coefficient("force per speed"),),
+            blocks={"contact": linear},
+            state=(0.0,),
+        ),
+        Form(
+            name="hunt_crossley",
+            what="in proportion to speed and to a power of the depth",
+            parameters=(
+                _coefficient("force per speed at 1 mm of depth"),
+                Parameter("exponent", "1", 0.1, 5.0, 1.0, "power of the depth in mm", starts=(0.5, 1.0, 1.5)),
+            ),
+            blocks={"contact": hunt_crossley},
+            state=(0.0,),
+        ),
+        Form(
+            name="with_stiffness",
+            what="in proportion to speed and to a stiffness that grows with depth",
+            parameters=(
+                _coefficient("force per speed at the surface"),
+                Parameter("growth", "1/mm", -2.0, 10.0, 0.7, "exponential growth with depth", starts=(0.3, 1.0)),
+            ),
+            blocks={"contact": with_stiffness},
+            state=(0.0,),
+        ),
+        Form(
+            name="power",
+            what="to a power of the speed",
+            parameters=(
+                _coefficient("force at 1 mm/s"),
+                Parameter("exponent", "1", 0.1, 2.0, 0.6, "power of the speed in mm/s", starts=(0.4, 0.7, 1.3)),
+            ),
+            blocks={"contact": power},
+            state=(0.0,),
+        ),
+    ),
+)
