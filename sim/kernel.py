@@ -321,15 +321,32 @@ def run_chain(program: Program, params: Array, state: Array, place: int, dt: Arr
 
 @compiled("void(int64[::1], float64[::1], float64[::1], float64[::1])")
 def unreport(program: Program, params: Array, state: Array, u: Array) -> None:
-    """True positions from reported ones, in place. `report` blocks are static and of slope near 1."""
+    """True positions from reported ones, in place, by bracketed secant steps; `report` blocks are static and rise."""
     program_p, params_p, state_p = pointer(program), pointer(params), pointer(state)
     for n in range(u.size):
         y = u[n]
-        for _ in range(60):
+        low, high = -math.inf, math.inf
+        before, error_before = y, 0.0
+        slope = 1.0
+        for k in range(60):
             error = chain(program_p, params_p, state_p, 0, REPORT, 0.0, y) - u[n]
-            y -= error
             if abs(error) <= 1e-15 * max(abs(y), 0.1):
                 break
+            if error > 0.0:
+                high = y
+            else:
+                low = y
+            if k > 0 and error != error_before:
+                slope = min(2.0, max(0.05, (error - error_before) / (y - before)))
+            before, error_before = y, error
+            y -= error / slope
+            if not low < y < high:
+                if high - low == math.inf:
+                    y = before - error
+                else:
+                    y = 0.5 * (low + high)
+                    if not low < y < high:  # nothing lies between
+                        break
         u[n] = y
 
 

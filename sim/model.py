@@ -230,6 +230,21 @@ def _form_schema(effect: Effect, form: Form) -> dict[str, Any]:
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
 
 
+def _as_form(fields: dict[str, Any]) -> dict[str, Any]:
+    """An elastic law written as in a pad, `law: polynomial, alpha: […]`, as the form of that name and its numbers."""
+    law, alpha = fields.pop("law", None), fields.get("alpha")
+    if law is not None:
+        if fields.get("form", law) != law:
+            raise ValueError(f"elastic_law has the law {law!r} and the form {fields['form']!r}: give one of them")
+        fields["form"] = law
+    if isinstance(alpha, list) and str(fields.get("form", "")).startswith("polynomial"):
+        degree = max(2, len(alpha) - 1)
+        fields["form"] = f"polynomial_{degree}"
+        del fields["alpha"]
+        fields |= {f"alpha_{i}": alpha[i] if i < len(alpha) else 0.0 for i in range(degree + 1)}
+    return fields
+
+
 class EffectEntry(_Part):
     """One effect: `{id, form, <parameter>: {value, unit, std} or a number}`. `form` may be left out."""
 
@@ -250,6 +265,8 @@ class EffectEntry(_Part):
         effects = all_effects()
         if name not in effects:
             raise ValueError(f"no effect {name!r}{nearest(name, effects)}")
+        if name == "elastic_law":
+            fields = _as_form(fields)
         chosen = fields.pop("form", None) or effects[name].forms[0].name
         names = [form.name for form in effects[name].forms]
         if chosen not in names:

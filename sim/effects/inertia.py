@@ -1,11 +1,10 @@
 """Inertia: the cell accelerates the mass beyond it, and feels the force that takes.
 
-- `rigid`: mass · acceleration of the probe. The acceleration is the second divided difference of the positions,
-  extrapolated to the end of the step from the one before: on even steps (2, −5, 4, −1)/dt², Houbolt's scheme, of second
-  order and stable when solved with frame and pad (J. C. Houbolt, A recurrence matrix solution for the dynamic response
-  of elastic aircraft, J. Aeronaut. Sci. 17, 1950, 540–550). No lag where the acceleration changes steadily; a jump of
-  the acceleration is seen within two steps. Earlier positions are taken at least three quarters of `window` apart:
-  noise of position grows with 1/window², and stamps of two interleaved clocks come close together.
+- `rigid`: mass · acceleration of the probe. The acceleration is the second divided difference of the positions, carried
+  half the way to the end of the step by its own change since the one before: no carrying is late by a window, and a
+  whole one overshoots where the acceleration jumps, as it does in planned moves. What is left is a lag of half a window
+  or a little more. Earlier positions are taken at least seven tenths of `window` apart: noise of position grows with
+  1/window², and stamps of two interleaved clocks come close together.
 - `damped`: mass · (acceleration + damping_rate · speed), a mass in oil or with a cable dragging.
 - `sprung`: the mass sits on a spring and damper of its own: natural frequency and damping ratio. Exact for an
   acceleration that is constant over each step, and brings the speed of the last step to that of this one.
@@ -27,7 +26,8 @@ _STARTED = 0
 _AGES = 1
 _PLACES = 5
 _KNOTS = 4
-_APART = 0.75
+_APART = 0.7
+_CARRY = 0.5
 _KG_MM = 1e-3
 """N per kg mm/s²."""
 
@@ -53,7 +53,7 @@ def rigid(dt: float, y: float, state: State, p: State) -> float:
     earlier = (y2 - y3) / (p3 - p2)
     newer = 2.0 * (speed - before) / p2  # a third of p1 + p2 ago
     older = 2.0 * (before - earlier) / (p3 - p1)  # p3/3 earlier still
-    acceleration = newer + (newer - older) * min((p1 + p2) / p3, 1.5)
+    acceleration = newer + _CARRY * (newer - older) * min((p1 + p2) / p3, 1.5)
     if state[_AGES] >= 0.999999 * p[2]:
         for i in range(_KNOTS - 1, 0, -1):
             state[_AGES + i] = state[_AGES + i - 1]

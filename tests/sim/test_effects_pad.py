@@ -1,0 +1,304 @@
+"""Effects of the pad and of its contact with the probe."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from sim.effects import effect
+from sim.effects.missing_relaxation_mode import _stretched_rates
+from sim.elastic import Exponential, Polynomial, Power, Spline
+from sim.pad import Cascade, Pad
+from sim.relaxation import Relaxation
+from tests.sim.effect_tools import GEL, LINEAR, SOFT, K, active, ramp, simulate
+from tests.sim.test_pad import walk
+
+
+class TestContactOffset:
+    def test_the_pad_is_met_later(self) -> None:
+        t, x = walk(300)
+        for offset in (0.2, -0.1):
+            assert_allclose(
+                simulate(SOFT, [active("contact_offset", offset=offset)], t, x),
+                simulate(SOFT, [], t, x - offset),
+                atol=1e-13,
+            )
+
+    def test_under_an_exponential_law_it_is_another_m(self) -> None:
+        m, b, offset = 2.24, 0.69, -0.3
+        x = np.linspace(0.1, 2.0, 50)
+        shifted = np.diff(
+            simulate(replace(SOFT, relaxation=Relaxation()), [active("contact_offset", offset=offset)], x, x)
+        )
+        other = Exponential(m * math.exp(-b * offset), b)
+        assert_allclose(shifted, np.diff(other.force(x)), rtol=1e-9)
+
+    def test_the_toe_is_a_parabola_that_ends_as_an_offset(self) -> None:
+        x = np.linspace(-0.5, 2.0, 251)
+        force = simulate(LINEAR, [active("contact_offset", "toe", offset=0.2)], x + 1, x)
+        expected = np.where(x < 0, 0.0, np.where(x < 0.4, x**2 / 0.8, x - 0.2))
+        assert_allclose(force, K * expected, atol=1e-13)
+
+
+class TestElasticLaw:
+    def test_each_form_is_the_law_of_its_name(self) -> None:
+        t, x = walk(200)
+        rises = {f"rise_{i}": 0.3 * i for i in range(1, 8)}
+        forces = tuple(0.3 * i * (i + 1) / 2 for i in range(1, 8))
+        cases = (
+            ("exponential", {"m": 1.5, "b": 0.2}, Exponential(1.5, 0.2)),
+            ("power", {"p": 3.0, "q": 0.8}, Power(3.0, 0.8)),
+            ("polynomial_2", {"alpha_1": 1.0, "alpha_2": 0.5}, Polynomial((0.0, 1.0, 0.5))),
+            ("polynomial_3", {"alpha_0": 0.1, "alpha_1": 1.0, "alpha_2": 0.5, "alpha_3": 0.2},
+             Polynomial((0.1, 1.0, 0.5, 0.2))),
+            ("spline", {"reach": 2.1, **rises}, Spline(tuple(0.3 * i for i in range(1, 8)), forces)),
+        )  # fmt: skip
+        for form, values, law in cases:
+            assert_allclose(
+                simulate(SOFT, [active("elastic_law", form, **values)], t, x),
+                simulate(replace(SOFT, law=law), [], t, x),
+                atol=1e-12,
+            )
+
+
+class TestMissingMode:
+    def relaxed(self, pad: Pad, effects: list, t: np.ndarray) -> np.ndarray:
+        """Force over that of the first instant, of a step at t = 0."""
+        force = simulate(pad, effects, t, np.ones(t.size))
+        return force / force[0]
+
+    t = np.concatenate([[0.0], np.geomspace(1e-4, 1e3, 200)])
+
+    def test_it_takes_from_what_never_relaxes(self) -> None:
+        out = self.relaxed(SOFT, [active("missing_relaxation_mode", share=0.2, rate=30.0)], self.t)
+        assert_allclose(out, GEL.reduced(self.t) - 0.2 * (1 - np.exp(-30.0 * self.t)), atol=1e-12)
+
+    def test_where_that_is_not_enough_the_others_give_way(self) -> None:
+        out = self.relaxed(SOFT, [active("missing_relaxation_mode", share=0.8, rate=30.0)], self.t)
+        others = 0.2 / 0.4 * (0.25 * np.exp(-4.0 * self.t) + 0.15 * np.exp(-0.35 * self.t))
+        assert_allclose(out, others + 0.8 * np.exp(-30.0 * self.t), atol=1e-12)
+
+    @pytest.mark.parametrize("stretch", [0.35, 0.5, 0.7, 0.95, 1.0])
+    def test_stretched(self, stretch: float) -> None:
+        numbers = {"share": 0.5, "rate": 2.0, "stretch": stretch}
+        out = self.relaxed(LINEAR, [active("missing_relaxation_mode", "stretched", **numbers)], self.t)
+        expected = 0.5 + 0.5 * np.exp(-((2.0 * self.t) ** stretch))
+        assert_allclose(out, expected, atol=0.5 * 0.05)
+        middle = (self.t > 0.02) & (self.t < 5)
+        assert_allclose(out[middle], expected[middle], atol=0.5 * 0.01)
+
+    def test_rates_of_the_stretched_form_are_quantiles_of_levys_law_at_one_half(self) -> None:
+        """e^(−√t) is the transform of the density e^(−1/4k)/(2√π k^(3/2)), whose distribution is erfc(1/(2√k))."""
+        nodes, _ = np.polynomial.legendre.leggauss(10)
+        below = [math.erfc(0.5 / math.sqrt(k)) for k in _stretched_rates(0.5)[1]]
+        assert_allclose(below, 0.5 * (1 + nodes), atol=1e-6)
+
+    def test_box(self) -> None:
+        numbers = {"share": 0.6, "rate": 2.0, "decades": 2.0}
+        out = self.relaxed(LINEAR, [active("missing_relaxation_mode", "box", **numbers)], self.t)
+        rates = np.geomspace(0.2, 20.0, 4001)
+        even = np.exp(-np.outer(self.t, 0.5 * (rates[1:] + rates[:-1]))).mean(axis=1)
+        assert_allclose(out, 0.4 + 0.6 * even, atol=1e-4)
+
+
+CYCLES = np.concatenate([ramp(1.0, 501), ramp(1.0, 501)[1:], ramp(1.5, 751)[1:]])
+TIME = np.arange(CYCLES.size) * 1e-3
+UP_1, DOWN_1, UP_2, DOWN_2, UP_3 = (
+    slice(0, 501), slice(1000, 499, -1), slice(1000, 1501), slice(2000, 1499, -1), slice(2000, 2501)
+)  # fmt: skip
+"""In to 1 mm, out, in to 1 mm, out, in to 1.5 mm: each part in the order of depth."""
+
+
+class TestStressSoftening:
+    @pytest.mark.parametrize("form", ["exponential", "linear", "ogden_roxburgh", "discontinuous_damage"])
+    def test_softer_below_the_deepest_and_the_same_at_every_return(self, form: str) -> None:
+        force = simulate(LINEAR, [active("stress_softening", form, share=0.3, depth=0.4)], TIME, CYCLES)
+        inside = slice(20, 480)
+        assert (force[UP_1][inside] > force[UP_2][inside] + 1e-3).all()
+        assert_allclose(force[DOWN_1], force[UP_2], atol=1e-12)  # no loop of its own
+        assert_allclose(force[DOWN_2], force[UP_2], atol=1e-12)
+        assert_allclose(force[UP_3], force[UP_2], atol=1e-12)
+        virgin = simulate(
+            LINEAR, [active("stress_softening", form, share=0.3, depth=0.4)], TIME[:751], ramp(1.5, 751, False)
+        )
+        assert_allclose(force[2500:2751], virgin[500:], atol=1e-12)  # beyond, as if never unloaded
+
+    def test_closed_forms(self) -> None:
+        x = CYCLES[UP_2]
+        share, depth, growth = 0.3, 0.4, 0.5
+        factors = {
+            "exponential": 1 - share * (1 - np.exp(-(1.0 - x) / depth)),
+            "linear": 1 - share * np.minimum(1, (1.0 - x) / depth),
+            "ogden_roxburgh": 1 - share * np.vectorize(math.erf)((1 - x**2) / (depth * (depth + growth))),
+            "discontinuous_damage": np.full(x.size, 1 - share * (1 - math.exp(-1.0 / depth))),
+        }
+        for form, factor in factors.items():
+            more = {"growth": growth} if form == "ogden_roxburgh" else {}
+            force = simulate(LINEAR, [active("stress_softening", form, share=share, depth=depth, **more)], TIME, CYCLES)
+            assert_allclose(force[UP_2], K * x * factor, atol=1e-12)
+
+    def test_a_preconditioned_pad_is_soft_from_the_start(self) -> None:
+        before = active("stress_softening", "preconditioned", share=0.3, depth=0.4, already=1.0)
+        fresh = active("stress_softening", share=0.3, depth=0.4)
+        assert_allclose(
+            simulate(LINEAR, [before], TIME, CYCLES)[UP_1], simulate(LINEAR, [fresh], TIME, CYCLES)[UP_2], atol=1e-12
+        )
+
+
+class TestPermanentSet:
+    def surface(self, form: str, deepest: float, **values: float) -> float:
+        """Depth at which the pad is met again."""
+        x = np.concatenate([ramp(deepest, 2001), ramp(deepest, 2001)[1:2001]])
+        force = simulate(LINEAR, [active("permanent_set", form, **values)], np.arange(x.size) * 1e-3, x)
+        again = force[4001:]
+        k = int(np.argmax(again > 0))
+        return float(x[4001:][k] - again[k] / K)
+
+    def test_linear_power_and_yielding(self) -> None:
+        for deepest in (0.5, 2.0):
+            assert_allclose(self.surface("linear", deepest, set=0.1), 0.1 * deepest, rtol=1e-9)
+            assert_allclose(self.surface("power", deepest, set=0.1, exponent=1.7), 0.1 * deepest**1.7, rtol=1e-9)
+        assert_allclose(self.surface("yielding", 2.0, set=0.1, limit=0.8), 0.12, rtol=1e-9)
+        assert_allclose(self.surface("yielding", 0.7, set=0.1, limit=0.8), 0.0, atol=1e-12)
+
+    def test_gradual(self) -> None:
+        plant = Cascade(LINEAR, [active("permanent_set", "gradual", set=0.2, rate=0.5)]).plant()
+        plant.step(0.0, 1.0)
+        for n in (1, 2, 5):
+            plant_n = plant.copy()
+            for _ in range(n):
+                force = plant_n.step(2.0 / n, 1.0)
+            assert_allclose(force, K * (1 - 0.2 * (1 - math.exp(-1.0))), rtol=1e-12)
+        plant.step(100.0, 1.0)
+        sunk = plant.copy()
+        sunk.step(1e-3, -1.0)
+        sunk.step(100.0, -1.0)
+        assert_allclose(sunk.step(1e-3, 0.5), K * (0.5 - 0.2), rtol=1e-9)
+
+
+class TestDamage:
+    def test_softer_with_all_travel(self) -> None:
+        rate, band = 0.05, 0.004
+        cycles = np.concatenate([ramp(1.0, 501)] + [ramp(1.0, 501)[1:]] * 3)
+        t = np.arange(cycles.size) * 1e-3
+        crests = 500 + 1000 * np.arange(4)
+        travel = np.arange(1, 5) * (1.0 - band)
+        for form, factor in (
+            ("exponential", np.exp(-rate * travel)),
+            ("hyperbolic", 1 / (1 + rate * travel)),
+            ("linear", 1 - rate * travel),
+        ):
+            force = simulate(LINEAR, [active("damage", form, rate=rate)], t, cycles)
+            assert_allclose(force[crests], K * factor, rtol=1e-9)
+        floor = simulate(LINEAR, [active("damage", rate=rate, floor=0.6)], t, cycles)
+        assert_allclose(floor[crests], K * (0.6 + 0.4 * np.exp(-rate * travel)), rtol=1e-9)
+
+    def test_by_energy_deep_travel_counts_more(self) -> None:
+        for deepest in (1.0, 2.0):
+            force = simulate(
+                LINEAR, [active("damage", "energy", rate=0.1, exponent=1.0, dead_band=0.0)], TIME[:501],
+                ramp(deepest, 501, False),
+            )  # fmt: skip
+            assert_allclose(force[-1], K * deepest * math.exp(-0.1 * deepest**2 / 2), rtol=1e-9)
+
+    def test_noise_of_position_does_not_wear_the_pad(self) -> None:
+        noise = 5e-4 * np.random.default_rng(4).standard_normal(60000)
+        x = 1.0 + noise
+        force = simulate(LINEAR, [active("damage", rate=0.1)], np.arange(x.size) * 1e-3, x)
+        lost = 1 - force[-1] / (K * x[-1])
+        assert 0.09 < lost < 0.1  # one press of 1 mm
+
+
+class TestRates:
+    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic"])
+    def test_relaxation_at_a_depth_runs_on_a_clock_of_its_own(self, form: str) -> None:
+        slope, depth = -0.25, 1.5
+        factor = {"linear": 0.625, "exponential": math.exp(-0.375), "hyperbolic": 1 / 1.375}[form]
+        t = np.linspace(0.0, 3.0, 301)
+        force = simulate(SOFT, [active("depth_dependent_relaxation", form, slope=slope)], t, np.full(t.size, depth))
+        assert_allclose(force / force[0], GEL.reduced(factor * t), rtol=1e-10)
+
+    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic"])
+    def test_rates_stay_above_0_and_finite(self, form: str) -> None:
+        block = effect("depth_dependent_relaxation").form(form).blocks["rate"]
+        for slope in (-5.0, -0.5, 0.0, 0.5, 5.0):
+            factors = np.array([block(0.0, float(d), [], [slope]) for d in np.linspace(0, 10, 2001)])
+            assert np.isfinite(factors).all() and (factors > 0).all()
+            assert factors[0] == 1.0
+            assert_allclose(factors[1] - 1, slope * 0.005, rtol=0.03, atol=1e-12)
+
+
+class TestViscousDamping:
+    x = np.concatenate([np.full(10, -0.5), -0.5 + 4.0 * np.arange(1, 501) * 1e-3, np.full(100, 1.5)])
+    t = np.arange(x.size) * 1e-3
+
+    @pytest.mark.parametrize(
+        ("form", "more", "factor"),
+        [
+            ("linear", {}, lambda x: 4.0),
+            ("hunt_crossley", {"exponent": 1.5}, lambda x: 4.0 * x**1.5),
+            ("with_stiffness", {"growth": 0.7}, lambda x: 4.0 * np.exp(0.7 * x)),
+            ("power", {"exponent": 0.5}, lambda x: 2.0),
+        ],
+    )
+    def test_force_at_a_steady_speed(self, form: str, more: dict[str, float], factor) -> None:
+        damper = active("viscous_damping", form, coefficient=0.05, **more)
+        force = simulate(LINEAR, [damper], self.t, self.x)
+        moving = slice(140, 510)
+        x = self.x[moving]
+        assert_allclose(force[moving] - K * x, 0.05 * factor(x), rtol=1e-3)
+        assert_allclose(force[512:], K * 1.5, rtol=1e-12)
+        assert_allclose(force[:10], 0.0)
+
+    @pytest.mark.parametrize("form", ["linear", "hunt_crossley", "with_stiffness", "power"])
+    @pytest.mark.parametrize("unilateral", [True, False])
+    def test_it_takes_energy_in_every_loop(self, form: str, unilateral: bool) -> None:
+        t = np.arange(2001) * 1e-3
+        x = 0.6 - 0.5 * np.cos(2 * math.pi * t)
+        pad = replace(LINEAR, unilateral=unilateral)
+        extra = simulate(pad, [active("viscous_damping", form, coefficient=0.05)], t, x) - simulate(pad, [], t, x)
+        steps = extra[1:] * np.diff(x)
+        assert (steps > -1e-9).all()
+        assert steps[1000:].sum() > 1e-3
+
+
+class TestSeparationAndAdhesion:
+    def test_separation_is_the_unilateral_pad(self) -> None:
+        t, x = walk(500)
+        bonded = replace(SOFT, unilateral=False)
+        assert np.array_equal(simulate(bonded, [active("separation")], t, x), simulate(SOFT, [], t, x))
+
+    @pytest.mark.parametrize(
+        ("form", "shape"),
+        [
+            ("exponential", lambda g: np.exp(-g / 0.2)),
+            ("linear", lambda g: np.maximum(0, 1 - g / 0.2)),
+            ("van_der_waals", lambda g: (1 + g / 0.2) ** -2.0),
+        ],
+    )
+    def test_reversible_pull(self, form: str, shape) -> None:
+        x = ramp(2.0, 401) - 1.0
+        force = simulate(LINEAR, [active("adhesion", form, pull_off=0.3, range=0.2)], np.arange(x.size) * 1e-2, x)
+        assert_allclose(force, K * np.maximum(x, 0) - 0.3 * shape(np.maximum(-x, 0)), atol=1e-12)
+        assert_allclose(force, force[::-1], atol=1e-12)
+
+    def test_sticking_pulls_on_the_way_out_alone(self) -> None:
+        x = ramp(2.0, 2001) - 1.0
+        stick = active("adhesion", "sticking", pull_off=0.3, range=0.2, dwell=0.01)
+        force = simulate(LINEAR, [stick], np.arange(x.size) * 1e-3, x)
+        way_in, way_out = force[:2001], force[:1999:-1]
+        assert_allclose(way_in[:950], 0.0, atol=1e-6)
+        gap = np.maximum(-x[:2001], 0.0)
+        pull = -0.3 * np.maximum(0, 1 - gap / 0.2)
+        assert_allclose(way_out[:990], pull[:990], atol=1e-6)
+        assert_allclose(way_in[1500:], way_out[1500:], atol=1e-6)
+
+    def test_a_torn_bond_does_not_come_back_by_itself(self) -> None:
+        plant = Cascade(LINEAR, [active("adhesion", "sticking", pull_off=0.3, range=0.2, dwell=0.01)]).plant()
+        plant.step(0.0, 0.5)
+        plant.step(1.0, 0.5)
+        assert_allclose(plant.step(1e-3, -0.1), -0.15, rtol=1e-6)
+        assert plant.step(1e-3, -0.25) == 0.0
+        assert_allclose(plant.step(1e-3, -0.1), 0.0, atol=1e-6)

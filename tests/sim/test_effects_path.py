@@ -1,0 +1,234 @@
+"""Effects of the force path and of its clock: lag, resonance, delay, drift, hum, limits, faults."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+from sim.effects import Active
+from sim.effects.draws import uniform
+from sim.pad import Cascade
+from tests.sim.effect_tools import AIR, LINEAR, SOFT, K, active, simulate
+from tests.sim.test_pad import walk
+
+Array = NDArray[np.float64]
+
+
+def sense(effect: Active, t: Array, force: Array) -> Array:
+    """What the force path makes of a force at the cell."""
+    plant = Cascade(AIR, [effect]).plant()
+    return np.array([plant.sense(float(d), float(f)) for d, f in zip(np.diff(t, prepend=t[0]), force, strict=True)])
+
+
+def sample(effect: Active, force: Array) -> Array:
+    """What sampling makes of a force."""
+    plant = Cascade(AIR, [effect]).plant()
+    return np.array([plant.sample(1e-3, float(f)) for f in force])
+
+
+EVEN = np.arange(3000) * 1e-3
+UNEVEN = np.cumsum(np.random.default_rng(3).uniform(0.0, 4e-3, 3000))
+
+
+class TestForceDelay:
+    def test_a_ramp_comes_late_by_speed_times_slope_times_delay(self) -> None:
+        x = 0.1 + 2.0 * EVEN
+        late = simulate(LINEAR, [active("force_delay", delay=0.0123)], EVEN, x)
+        assert_allclose((K * x - late)[20:], 2.0 * K * 0.0123, rtol=1e-9)
+
+    def test_it_is_exact_between_samples(self) -> None:
+        t, x = walk(400)
+        t = t + np.arange(t.size) * 1e-4  # no stamps repeat
+        late = Cascade(SOFT, [active("force_delay", delay=7.7e-4)]).simulate_at(t, x, t + 7.7e-4)
+        assert_allclose(late, simulate(SOFT, [], t, x), atol=1e-6)
+
+
+class TestClockSkew:
+    @pytest.mark.parametrize("form", ["linear", "offset", "ageing"])
+    def test_clocks_agree_at_the_first_sample_and_part_at_the_rate(self, form: str) -> None:
+        stamp = 100.0 + np.linspace(0.0, 50.0, 11)
+        felt = Cascade(AIR, [active("clock_skew", form, skew=200.0)]).felt_at(stamp)
+        assert felt[0] == stamp[0]
+        apart = (stamp - felt)[1] / 5.0 * 1e6
+        assert_allclose(apart, {"ageing": 200 * (1 + 2.5 / 100)}.get(form, 200 / (1 + 2e-4)), rtol=1e-9)
+
+    def test_the_ageing_clock_has_twice_the_skew_after_the_time(self) -> None:
+        stamp = np.array([0.0, 100.0, 100.001])
+        felt = Cascade(AIR, [active("clock_skew", "ageing", skew=500.0, doubling=100.0)]).felt_at(stamp)
+        assert_allclose(1 - (felt[2] - felt[1]) / 0.001, 2 * 500e-6, rtol=1e-4)
+
+    def test_an_offset_without_skew_is_a_delay(self) -> None:
+        t, x = walk(300)
+        offset = simulate(SOFT, [active("clock_skew", "offset", skew=0.0, offset=0.004)], t, x)
+        assert_allclose(offset, simulate(SOFT, [active("force_delay", delay=0.004)], t, x), atol=1e-9)
+
+
+class TestSensorLag:
+    @pytest.mark.parametrize("form", ["first_order", "two_poles", "butterworth", "moving_average"])
+    @pytest.mark.parametrize("t", [EVEN, UNEVEN], ids=["even", "uneven"])
+    def test_behind_a_ramp_by_the_time_constant(self, form: str, t: Array) -> None:
+        tau = 0.03
+        out = sense(active("sensor_lag", form, time_constant=tau), t, 3.0 * t)
+        assert_allclose((3.0 * t - out)[t > 40 * tau], 3.0 * tau, rtol=1e-9)
+
+    def test_closed_forms_of_the_ramp_from_its_start(self) -> None:
+        tau, s = 0.02, UNEVEN - UNEVEN[0]
+        first = s - tau * (1 - np.exp(-s / tau))
+        h = tau / 2
+        second = s - 2 * h + (2 * h + s) * np.exp(-s / h)
+        mean = np.where(s < 2 * tau, s**2 / (4 * tau), s - tau)
+        for form, expected in (("first_order", first), ("two_poles", second), ("moving_average", mean)):
+            out = sense(active("sensor_lag", form, time_constant=tau), UNEVEN, s)
+            assert_allclose(out, expected, atol=1e-12)
+
+    def test_butterworth_overshoots_a_step_by_four_percent(self) -> None:
+        force = np.where(EVEN > 0.1, 1.0, 0.0)
+        out = sense(active("sensor_lag", "butterworth", time_constant=0.05), EVEN, force)
+        assert_allclose(out.max(), 1 + math.exp(-math.pi), atol=1e-4)
+
+    def test_a_moving_average_of_many_samples_is_theirs(self) -> None:
+        """More samples in the window than it has knots for."""
+        t = np.arange(40001) * 1e-5
+        force = np.sin(30 * t) + 0.3 * np.cos(170 * t)
+        out = sense(active("sensor_lag", "moving_average", time_constant=0.04), t, force)
+        total = (1 - np.cos(30 * t)) / 30 + 0.3 * np.sin(170 * t) / 170
+        w = 8000
+        assert_allclose(out[w:], (total[w:] - total[:-w]) / 0.08, atol=1e-5)
+
+    def test_the_first_sample_is_rest(self) -> None:
+        for form in ("first_order", "two_poles", "butterworth", "moving_average"):
+            assert_allclose(sense(active("sensor_lag", form), EVEN[:50], np.full(50, 4.0)), 4.0)
+
+
+class TestResonance:
+    def ringing(self, frequency: float, damping: float, t: Array) -> Array:
+        """Response to a ramp that begins at 0, less what is left of it in the end."""
+        out = sense(active("resonance", frequency=frequency, damping_ratio=damping), t, t)
+        return out - (t - 2 * damping / (2 * math.pi * frequency))
+
+    def test_frequency_and_decrement(self) -> None:
+        frequency, damping = 20.0, 0.08
+        t = np.arange(20001) * 1e-4
+        swing = self.ringing(frequency, damping, t)
+        crests = np.flatnonzero((swing[1:-1] > swing[:-2]) & (swing[1:-1] > swing[2:])) + 1
+        crests = crests[:5]
+        period = 1 / (frequency * math.sqrt(1 - damping**2))
+        assert_allclose(np.diff(t[crests]), period, atol=2e-4)
+        decrement = np.log(swing[crests][:-1] / swing[crests][1:])
+        assert_allclose(decrement, 2 * math.pi * damping / math.sqrt(1 - damping**2), rtol=1e-3)
+
+    def test_the_ramp_is_exact_at_any_spacing(self) -> None:
+        w, z = 2 * math.pi * 20.0, 0.08
+        t = UNEVEN - UNEVEN[0]
+        w_d = w * math.sqrt(1 - z * z)
+        e, de = 2 * z / w, -1.0
+        expected = np.exp(-z * w * t) * (e * np.cos(w_d * t) + (de + z * w * e) / w_d * np.sin(w_d * t))
+        assert_allclose(self.ringing(20.0, 0.08, t), expected, atol=1e-12)
+
+    def test_a_sine_is_amplified_as_the_transfer_function_says(self) -> None:
+        t = np.arange(40000) * 2e-4
+        w, z = 2 * math.pi * 20.0, 0.2
+        for ratio in (0.5, 1.0, 2.0):
+            out = sense(active("resonance", frequency=20.0, damping_ratio=z), t, np.sin(ratio * w * t))
+            gain = 1 / math.hypot(1 - ratio**2, 2 * z * ratio)
+            assert_allclose(np.abs(out[t > 4]).max(), gain, rtol=2e-3)
+
+    def test_a_part_that_rings(self) -> None:
+        force = np.where(EVEN > 0.1, 1.0, 0.0)
+        numbers = {"frequency": 30.0, "damping_ratio": 0.1}
+        whole = sense(active("resonance", **numbers), EVEN, force)
+        part = sense(active("resonance", "partial", share=0.25, **numbers), EVEN, force)
+        assert_allclose(part, 0.75 * force + 0.25 * whole, atol=1e-13)
+
+
+class TestBiasDriftHum:
+    def test_bias(self) -> None:
+        assert_allclose(sense(active("force_bias", bias=-0.2), EVEN[:3], np.array([0.0, 1.0, 2.0])), [-0.2, 0.8, 1.8])
+
+    @pytest.mark.parametrize("form", ["linear", "settling", "root", "logarithmic"])
+    def test_all_drifts_begin_at_the_rate(self, form: str) -> None:
+        t = np.array([5.0, 5.001])
+        assert_allclose(sense(active("force_drift", form, rate=-0.3), t, np.zeros(2)), [0.0, -0.3e-3], rtol=1e-4)
+
+    def test_where_drifts_go(self) -> None:
+        t = np.array([0.0, 1e4, 4e4])
+        zero = np.zeros(3)
+        numbers = {"rate": 0.01, "time_constant": 20.0}
+        assert_allclose(sense(active("force_drift", rate=0.01), t, zero), 0.01 * t)
+        assert_allclose(sense(active("force_drift", "settling", **numbers), t, zero)[1:], 0.2)
+        root = sense(active("force_drift", "root", **numbers), t, zero)
+        assert_allclose(root[2] / root[1], 2.0, rtol=0.05)
+        log = sense(active("force_drift", "logarithmic", **numbers), t, zero)
+        assert_allclose(log[2] - log[1], 0.2 * math.log(4), rtol=0.01)
+
+    def test_hum(self) -> None:
+        out = sense(active("mains_hum", amplitude=0.1, frequency=50.0, phase=0.4), 7.0 + UNEVEN, np.zeros(UNEVEN.size))
+        s = UNEVEN - UNEVEN[0]
+        assert_allclose(out, 0.1 * np.sin(2 * math.pi * 50 * s + 0.4), atol=1e-9)
+        t = np.arange(4000) * 1e-3
+        both = sense(active("mains_hum", "harmonics", amplitude=0.1, ratio=0.3), t, np.zeros(t.size))
+        spectrum = np.abs(np.fft.rfft(both)) / 2000
+        assert_allclose(spectrum[[200, 400, 600]], [0.1, 0.0, 0.03], atol=1e-9)
+
+
+class TestLimitsAndFaults:
+    force = np.linspace(-10.0, 10.0, 401)
+
+    def test_saturation(self) -> None:
+        assert_allclose(sample(active("saturation", limit=4.0), self.force), np.clip(self.force, -4, 4))
+        assert_allclose(sample(active("saturation", "upper", limit=4.0), self.force), np.minimum(self.force, 4))
+        soft = sample(active("saturation", "soft", limit=4.0, sharpness=3.0), self.force)
+        assert np.all(np.diff(soft) > 0)
+        assert np.abs(soft).max() < 4.0
+        near = np.abs(self.force) < 0.3
+        assert_allclose(soft[near], self.force[near], rtol=1e-3)
+        sharp = sample(active("saturation", "soft", limit=4.0, sharpness=60.0), self.force)
+        assert_allclose(sharp, np.clip(self.force, -4, 4), atol=0.05)
+
+    @pytest.mark.parametrize("form", ["heavy", "spikes", "one_sided", "dropouts"])
+    def test_outliers(self, form: str) -> None:
+        n, fraction, size = 60000, 0.03, 2.0
+        off = sample(active("outliers", form, fraction=fraction, size=size), np.full(n, 5.0)) - 5.0
+        hit = off != 0.0
+        spread = 5 * math.sqrt(fraction * (1 - fraction) / n)
+        assert abs(hit.mean() - fraction) < spread
+        gaps = np.diff(np.flatnonzero(hit))
+        assert abs((gaps == 1).mean() - fraction) < 5 * math.sqrt(fraction / gaps.size)  # they come singly
+        if form == "spikes":
+            assert set(np.round(off[hit], 12)) == {-2.0, 2.0}
+        elif form == "dropouts":
+            assert_allclose(off[hit], size - 5.0)
+        else:
+            assert abs(np.abs(off[hit]).mean() - size) < 5 * size / math.sqrt(hit.sum())
+            assert (off[hit] > 0).all() == (form == "one_sided")
+        if form in ("heavy", "spikes"):
+            assert abs((off[hit] > 0).mean() - 0.5) < 2.5 / math.sqrt(hit.sum())
+
+    @pytest.mark.parametrize("form", ["runs", "random_runs"])
+    def test_stuck_samples(self, form: str) -> None:
+        n, fraction, length = 60000, 0.1, 12
+        force = np.arange(n, dtype=np.float64)
+        out = sample(active("stuck_samples", form, fraction=fraction, length=length), force)
+        stuck = out != force
+        edges = np.flatnonzero(np.diff(stuck.astype(int)))
+        starts = edges[::2]
+        assert abs(stuck.mean() - fraction) < 5 * fraction * math.sqrt(2 / starts.size)
+        for start in starts:
+            assert (out[start + 1] == start) and out[start] == start  # the last good value
+        assert np.all(out[stuck] < force[stuck])
+        lengths = np.diff(edges)[::2][: starts.size - 1]
+        if form == "runs":
+            assert (lengths % length == 0).all()  # a run may begin as the last one ends
+        else:
+            assert abs(lengths.mean() - length) < 5 * length / math.sqrt(lengths.size)
+
+    def test_draws_are_even_and_each_seed_has_its_own(self) -> None:
+        draws = np.array([[uniform(n, seed) for n in range(20000)] for seed in range(3)])
+        assert ((draws > 0) & (draws < 1)).all()
+        counts = np.stack([np.histogram(row, 20, (0, 1))[0] for row in draws])
+        assert_allclose(counts, 1000, atol=5 * math.sqrt(1000))
+        correlation = np.corrcoef(np.vstack([draws, np.roll(draws[0], 1)]))
+        assert np.abs(correlation - np.eye(4)).max() < 5 / math.sqrt(20000)
+        assert uniform(7, 1) == uniform.python(7, 1)
