@@ -184,7 +184,7 @@ class Compiled(_Deferred, Generic[P, R]):
         """The compiled function itself; call this one where 0.1 µs a call matters."""
         bound = _bound(self.python)
         with _numba_cache(bound) as numba:
-            result: Callable[P, R] = numba.njit(self.signature, cache=True, error_model="numpy")(bound)
+            result: Callable[P, R] = numba.njit(self.signature, cache=True, error_model="numpy", nogil=True)(bound)
         return result
 
     def numba_object(self) -> Any:

@@ -6,8 +6,8 @@ residual; it is only a start: a candidate is judged by a joint refit.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from sim.effects import all_effects
-from sim.effects.base import Effect, Form
+from sim.effects.base import Effect, Form, Parameter
 from sim.elastic import NoPad
 
 from .data import Data
@@ -24,9 +24,10 @@ from .refit import Fit, errors, force_at, jacobian
 
 Array = NDArray[np.float64]
 
-CHANNEL = ("outliers", "stuck_samples")  # found by detectors, not by fitting
-MOST_STARTS = 48
-REPEATABLE = ("missing_relaxation_mode", "mains_hum")
+CHANNEL = ("outliers", "stuck_samples", "mains_hum")  # found by detectors, not by fitting
+MOST_STARTS = 96
+PERIODS = 24
+MANY = 20
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,46 @@ class Start:
     promise: float
 
 
-def forms(structure: Structure, in_air: bool) -> list[tuple[Effect, Form]]:
+@dataclass(frozen=True)
+class Reach:
+    """What the data can tell of at all: spans of time and travel, and the finest sampling."""
+
+    sample_s: float
+    span_s: float
+    travel_mm: float
+    depth_mm: float
+    force_N: float
+
+
+def narrowed(form: Form, reach: Reach) -> Form:
+    """The form with its parameters kept within what the data can tell of, and started there."""
+    return replace(form, parameters=tuple(_narrowed(p, reach) for p in form.parameters))
+
+
+def _narrowed(p: Parameter, reach: Reach) -> Parameter:
+    lower, upper, starts, default = p.lower, p.upper, p.starts, p.if_left_out
+    if p.unit == "1/s" and p.logarithmic:
+        lower, upper = max(lower, 0.3 / reach.span_s), min(upper, 0.6 / reach.sample_s)
+    elif p.unit == "Hz":
+        lower, upper = max(lower, 2.0 / reach.span_s), min(upper, 0.45 / reach.sample_s)
+    elif p.unit == "s" and p.logarithmic:
+        upper = min(upper, 3.0 * reach.span_s)
+    elif p.name == "period":
+        lower, upper = max(lower, 0.03 * reach.travel_mm), min(upper, 3.0 * reach.travel_mm)
+        starts = tuple((reach.travel_mm / np.linspace(0.45, 10.0, PERIODS)).tolist())
+    elif p.name == "reach":
+        default = reach.depth_mm
+    elif p.name == "limit" and p.unit == "N":
+        starts = (0.55 * reach.force_N, 0.75 * reach.force_N, 0.9 * reach.force_N)
+    if lower >= upper:
+        return p
+    starts = tuple(v for v in starts if lower <= v <= upper)
+    default = min(max(default, lower), upper)
+    typical = min(max(p.typical, lower), upper)
+    return replace(p, lower=lower, upper=upper, starts=starts, default=default, typical=typical)
+
+
+def forms(structure: Structure, in_air: bool, reach: Reach) -> list[tuple[Effect, Form]]:
     """All forms of all effects that may be added to a structure."""
     present = {c.id for c in structure.causes}
     out = []
@@ -47,9 +87,9 @@ def forms(structure: Structure, in_air: bool) -> list[tuple[Effect, Form]]:
         for form in effect.forms:
             if in_air and not _in_air(form):
                 continue
-            if form.amend is not None and not _amends(structure, form):
+            if not form.sought or (form.amend is not None and not _amends(structure, form)):
                 continue
-            out.append((effect, form))
+            out.append((effect, narrowed(form, reach)))
     return out
 
 
@@ -76,6 +116,7 @@ class Signatures:
         self.force = force_at(data, fit.structure, fit.x)
         self.scale = np.sqrt(data.weight) / data.sigma_N
         J = jacobian(data, fit.structure, fit.x, self.force)
+        self.jacobian = J[:, : len(fit.x) - (1 if fit.structure.doubt_mm > 0 else 0)]
         norm = np.linalg.norm(J, axis=0)
         J = J[:, norm > 1e-9 * max(float(norm.max(initial=0.0)), 1e-300)]
         self.Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
@@ -108,7 +149,7 @@ def _with(fit: Fit, added: Array) -> Array:
     return np.concatenate([fit.x[:n], added, fit.x[n:]])
 
 
-def combinations(form: Form, limits: Mapping[str, float]) -> Iterator[dict[str, float]]:
+def combinations(form: Form) -> Iterator[dict[str, float]]:
     """Values to start the form's shape from: all combinations, thinned where there are too many."""
     shapes = [p for p in form.parameters if not p.amplitude and not p.fixed and p.starts]
     several: Iterable[tuple[float, ...]] = product(*(p.starts for p in shapes))
@@ -118,16 +159,19 @@ def combinations(form: Form, limits: Mapping[str, float]) -> Iterator[dict[str, 
         yield dict(zip([p.name for p in shapes], values, strict=True))
 
 
-def starts(data: Data, signatures: Signatures, effect: Effect, form: Form, most: int = 2) -> list[Start]:
+def starts(signatures: Signatures, effect: Effect, form: Form, most: int = 2) -> list[Start]:
     """The most promising starts of a form, best first."""
     cause = cause_of(effect, form)
     if form.amend is not None and cause.amplitude is None:
         return [Start(c, np.inf) for c in _amended(signatures.fit, cause)]
     if cause.amplitude is None:
-        return [Start(cause.with_start(**values), np.inf) for values in combinations(form, {})][:most]
+        return [Start(cause.with_start(**values), np.inf) for values in combinations(form)][:most]
     amplitude = cause.amplitude
     found: list[Start] = []
-    for values in combinations(form, {}):
+    every = list(combinations(form))
+    if len(every) > MANY and form.name != effect.forms[0].name:
+        return []  # it is tried from where the family's first form has ended
+    for values in every:
         trial = cause.with_start(**values)
         promise, best = signatures.of(trial)
         least = 0.05 * abs(amplitude.typical)

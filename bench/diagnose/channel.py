@@ -135,7 +135,8 @@ def far(values: Array) -> float:
     q50, q80, q95 = (float(q) for q in np.quantile(size, [0.5, 0.8, 0.95]))
     if q50 <= 0.0:
         return np.inf
-    ratios = student_t.ppf([0.9, 0.975], DEGREES[:, None]) / student_t.ppf(0.75, DEGREES)[:, None]
+    ratios = np.stack([np.asarray(student_t.ppf(q, DEGREES)) for q in (0.9, 0.975)], axis=1)
+    ratios /= np.asarray(student_t.ppf(0.75, DEGREES))[:, None]
     k = int(np.argmin((ratios[:, 0] - q80 / q50) ** 2 * 4.0 + (ratios[:, 1] - q95 / q50) ** 2))
     degrees = float(DEGREES[k])
     scale = q50 / float(student_t.ppf(0.75, degrees))

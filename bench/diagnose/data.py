@@ -12,8 +12,9 @@ from bench.identify.problem import build
 from bench.recording.types import Measurement
 from sim.jit import compiled
 
+from .hum import Line, find
 from .motion import felt, position_noise, resolution
-from .noise import Colour, ForceNoise, force_noise
+from .noise import Colour, ForceNoise, force_noise, hold_errors
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -59,11 +60,21 @@ class Prepared:
     owner: NDArray[np.intp]
     at: NDArray[np.intp]
     noise: ForceNoise
+    hum: Line | None
+    """What hums, and has been taken out of the force."""
     position_noise_mm: float
     sample_s: float
     doubt_mm: float
     depth_mm: float
     force_scale_N: float
+
+    @property
+    def raw(self) -> Data:
+        """`full` with the hum still in it."""
+        if self.hum is None:
+            return self.full
+        hum = self.hum.force_N(self.full.time_s - self.full.time_s[0])
+        return replace(self.full, force_N=self.full.force_N + np.where(self.full.weight > 0, hum, 0.0))
 
     @property
     def colour(self) -> Colour:
@@ -82,6 +93,9 @@ def prepare(m: Measurement, good: Mask) -> Prepared:
 
     Raises InputError as a fit does, for data that cannot be fitted at all.
     """
+    line = find(float(m.position_time_s[0]), float(np.median(np.diff(m.force_time_s))), hold_errors(m, good))
+    if line is not None:
+        m = replace(m, force_N=m.force_N - line.force_N(m.force_time_s - m.position_time_s[0]))
     position_sigma = position_noise(m.position_mm)
     positions, left = felt(m.position_time_s, m.position_mm)
     noise = force_noise(m, good)
@@ -108,6 +122,7 @@ def prepare(m: Measurement, good: Mask) -> Prepared:
         owner=owner,
         at=where,
         noise=replace(noise, force_N=sigma_force),
+        hum=line,
         position_noise_mm=position_sigma,
         sample_s=float(np.median(np.diff(m.force_time_s))),
         doubt_mm=m.surface_std_mm,
@@ -138,7 +153,8 @@ def _blocks(full: Data, stiffness: float, sigma_force: float, jump_mm: float) ->
 
 
 def _grouped(full: Data, stiffness: float, step_N: float, rate: float, jump_mm: float) -> NDArray[np.intp]:
-    """`jump_mm`: what noise alone makes of a change of speed; `step_N`: force that the travel within a block may make; `rate`: growth of blocks."""
+    """`step_N`: force that the travel within a block may make; `rate`: growth of blocks; `jump_mm`: what noise alone
+    makes of a change of speed."""
     reach = step_N / max(stiffness, 1e-9)
     position = full.position_mm
     step = np.diff(position, prepend=position[0])

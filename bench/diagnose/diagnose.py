@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from bench import identify
 from bench.errors import InputError
 from bench.recording.types import Measurement
-from sim.effects import all_effects
 from sim.model import Model
 from sim.pad import Pad
 
 from .channel import Faults, faults, standing_off
+from .channel_causes import channel_causes, hum_cause
 from .data import Prepared, prepare
 from .numbers import PadNumbers, Structure, cause_of
-from .refit import Fit, force_at, mean_square, onto
+from .refit import Fit, extended, force_at, mean_square, onto, refit
 from .remains import remains
-from .result import Alternative, CauseFound, Diagnosis, Number
+from .result import Alternative, Diagnosis
 from .search import Path, Search
 from .verdict import EXPLAINED, chain, excesses, found, ordered
 from .write import model_of
@@ -53,9 +53,30 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     final = ordered(prepared, final, base)
     tell("predicting what was held out")
     fits = chain(prepared, final, base)
-    squares, excess = excesses(prepared, fits)
-    whole = [onto(fit, prepared.full, 6, 1e-8) for fit in (fits[0], fits[-1])]
-    return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, begun)
+    floor = _floor(prepared, final)
+    squares, excess = excesses(prepared, fits, floor)
+    whole = _whole(prepared, fits)
+    return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
+
+
+def _floor(prepared: Prepared, final: Fit) -> float:
+    """Noise of the data, N: as the holds tell it, or less where a model leaves less."""
+    n = float(prepared.full.weight.sum())
+    left = mean_square(prepared.full, final.structure, final.x) * n / max(n - final.free, 1.0)
+    return min(prepared.floor_N, float(np.sqrt(left)))
+
+
+def _whole(prepared: Prepared, fits: list[Fit]) -> tuple[Fit, Fit]:
+    """First and last fit carried to the end on all the data, with the hum that the last one then has to make."""
+    raw = prepared.raw
+    before = onto(fits[0], prepared.full, 6, 1e-8)
+    last = fits[-1]
+    if prepared.hum is None:
+        return before, onto(last, raw, 6, 1e-8)
+    cause = hum_cause(prepared.hum)
+    structure = last.structure.with_cause(cause)
+    own = structure.x(last.x[: len(structure.pad.coordinates)], None)[structure.of_cause(len(structure.causes) - 1)]
+    return before, refit(raw, structure, extended(last, structure, own), 8, 1e-8)
 
 
 def believed_structure(model: Model, prepared: Prepared) -> Structure:
@@ -106,56 +127,59 @@ def _asked_again(
 
 def _concluded(
     m: Measurement, believed: Model, prepared: Prepared, flags: Faults, search: Search, path: Path,
-    fits: list[Fit], whole: list[Fit], squares: list[float], excess: list[float], begun: float,
+    fits: list[Fit], whole: tuple[Fit, Fit], squares: list[float], excess: list[float], floor: float, begun: float,
 ) -> Diagnosis:  # fmt: skip
-    full, floor = prepared.full, prepared.floor_N
+    full, raw, at = prepared.full, prepared.raw, prepared.at
     before, after = (force_at(full, f.structure, f.x) for f in whole)
-    counted = full.weight > 0
-    channel, flagged_square = _channel_causes(m, prepared, flags, before)
-    whole_excess = excess[0] + flagged_square
-    scale = max(whole_excess, 1e-300)
-    gains = [max(a - b, 0.0) / scale if whole_excess > 0 else 0.0 for a, b in zip(excess, excess[1:], strict=False)]
-    causes = found(search, path, fits, whole[-1], gains)
-    for c in channel:
-        causes.append(replace(c, gain=c.gain / scale))
-    left = excess[-1] / scale if whole_excess > 0 else 0.0
-    left = 1.0 - sum(c.gain for c in causes) if causes else 1.0
-    residual = full.force_N - after
-    tests = remains(full, residual, after, prepared.colour, whole[-1].free)
+    channel = channel_causes(m, prepared, flags, before, whole[1])
+    apart = sum(c.gain for c in channel)  # still in N²
+    scale = excess[0] + apart
+    if scale <= 0:
+        scale = np.inf
+    gains = [max(a - b, 0.0) / scale for a, b in zip(excess, excess[1:], strict=False)]
+    causes = found(search, path, fits, whole[1], gains)
+    causes += [replace(c, gain=c.gain / scale) for c in channel]
+    left = 1.0 - sum(c.gain for c in causes)
+    residual = raw.force_N - after
+    tests = remains(full, residual, after, prepared.colour, whole[1].free)
     told = [r for r in tests if r.passed]
-    if not causes and not told:
-        verdict = "consistent"
-    elif not causes:
-        verdict = "unexplained" if excess[0] > TOLD * floor**2 else "consistent"
-    else:
+    if causes:
         verdict = "explained" if left <= EXPLAINED else "unexplained"
-    at = prepared.at
+    else:
+        verdict = "unexplained" if told and excess[0] > TOLD * floor**2 else "consistent"
     flagged = ~flags.good[-len(at) :]
-    rmse_after, unflagged = _errors(m, prepared, after)
+    inside = _counted(m, at)
+    good = raw.weight[at] > 0
     return Diagnosis(
         verdict=verdict,
         causes=causes,
         left=float(left),
         noise_floor=floor,
-        rmse_before=float(np.sqrt(np.mean((full.force_N - before)[at][_counted(m, at)] ** 2))),
-        rmse_after=rmse_after,
-        held_out_before=float(np.sqrt(squares[0] + flagged_square)),
+        rmse_before=float(np.sqrt(np.mean((raw.force_N - before)[at][inside] ** 2))),
+        rmse_after=float(np.sqrt(np.mean(residual[at][good] ** 2))),
+        held_out_before=float(np.sqrt(squares[0] + apart)),
         held_out_after=float(np.sqrt(squares[-1])),
         flagged_fraction=float(flagged.mean()),
         seconds=time.perf_counter() - begun,
-        model_dict=model_of(believed, whole[-1], prepared),
-        rmse_after_unflagged=unflagged,
+        model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
         notes=list(m.notes),
         remainders=tests,
         name=m.name,
         time_s=full.time_s[at],
         position_mm=full.position_mm[at],
-        force_N=full.force_N[at],
+        force_N=raw.force_N[at],
         before_N=before[at],
         after_N=after[at],
         sigma_N=full.sigma_N[at],
-        flagged=flagged,
-        counted=counted[at],
+        flags={
+            name: mask[-len(at) :]
+            for name, mask in (
+                ("saturation", flags.saturated),
+                ("stuck_samples", flags.stuck),
+                ("outliers", flags.outlier),
+            )
+        },
+        counted=good,
         ranking=_ranking(path),
     )
 
@@ -163,48 +187,6 @@ def _concluded(
 def _counted(m: Measurement, at: NDArray[np.intp]) -> Mask:
     time = m.force_time_s[-len(at) :]
     return np.asarray((time >= m.fit_from_s) & (time <= m.fit_to_s))
-
-
-def _errors(m: Measurement, prepared: Prepared, after: Array) -> tuple[float, float]:
-    """RMS error of the extended model over all samples, and over those not flagged."""
-    full, at = prepared.full, prepared.at
-    e = (full.force_N - after)[at]
-    inside = _counted(m, at)
-    good = full.weight[at] > 0
-    return float(np.sqrt(np.mean(e[inside] ** 2))), float(np.sqrt(np.mean(e[good] ** 2)))
-
-
-def _channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before: Array) -> tuple[list[CauseFound], float]:
-    """Channel faults as causes; their gain is still in N² (mean square of the flagged samples over all)."""
-    at = prepared.at
-    e = (prepared.full.force_N - before)[at]
-    n = max(len(at), 1)
-    out, total = [], 0.0
-    for id_, mask in (
-        ("saturation", flags.saturated),
-        ("stuck_samples", flags.stuck),
-        ("outliers", flags.outlier),
-    ):
-        mask = mask[-len(at) :] & _counted(m, at)
-        count = int(mask.sum())
-        if count == 0 or (id_ == "outliers" and count < 3):
-            continue
-        square = float(np.sum(e[mask] ** 2)) / n
-        total += square
-        share = count / n
-        if id_ == "saturation":
-            numbers = {"limit": Number(float(flags.limit_N or 0.0), "N", prepared.noise.force_N)}
-        else:
-            numbers = {"fraction": Number(share, "1", float(np.sqrt(share * (1 - share) / n)))}
-        effect = all_effects().get(id_)
-        values = {name: v.value for name, v in numbers.items()}
-        try:
-            words = effect.explanation(values) if effect is not None else id_
-        except KeyError:
-            words = effect.what if effect is not None else id_
-        form = effect.forms[0].name if effect is not None else ""
-        out.append(CauseFound(id_, form, numbers, square, 0.99, [], words, effect.check if effect is not None else ""))
-    return out, total
 
 
 def _ranking(path: Path) -> list[Alternative]:
@@ -217,6 +199,3 @@ def _ranking(path: Path) -> list[Alternative]:
         Alternative(t.id, t.cause.form.name, max((base - t.fit.chi2) / gained, 0.0), t.fit.chi2 - best, False)
         for t in path.rivals[0]
     ]
-
-
-__all__ = ["believed_structure", "diagnose", "mean_square"]

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 LONGEST = 2000  # samples of a hold that are looked at
 LEAST = 12
+MEMORY_S = 0.15  # correlation time beyond which it is no noise, but structure
 
 
 @dataclass(frozen=True)
@@ -52,9 +53,13 @@ class ForceNoise:
     from_holds: bool
 
 
-def force_noise(m: Measurement, good: NDArray[np.bool_]) -> ForceNoise:
-    """Of the force samples (m,) that are `good`, about smooth curves through the holds."""
-    parts: list[tuple[Array, Array]] = []
+Part = tuple[Array, Array, Array]
+"""Of one hold: stamps, errors about a smooth curve, and the orthonormal basis that was taken out."""
+
+
+def hold_errors(m: Measurement, good: NDArray[np.bool_]) -> list[Part]:
+    """What smooth curves leave of the force samples (m,) that are `good`, hold by hold."""
+    parts: list[Part] = []
     for stretch in holds(m.position_time_s, m.position_mm):
         t0, t1 = m.position_time_s[stretch.start], m.position_time_s[stretch.stop - 1]
         first, last = np.searchsorted(m.force_time_s, [t0, t1])
@@ -63,25 +68,31 @@ def force_noise(m: Measurement, good: NDArray[np.bool_]) -> ForceNoise:
         first = max(first, int(last) - LONGEST)
         kept = np.arange(first, int(last))[good[first : int(last)]]
         if len(kept) >= LEAST:
-            parts.append(_about_curve(m.force_time_s[kept], m.force_N[kept]))
+            parts.append((m.force_time_s[kept], *_about_curve(m.force_time_s[kept], m.force_N[kept])))
+    return parts
+
+
+def force_noise(m: Measurement, good: NDArray[np.bool_]) -> ForceNoise:
+    """Of the force samples (m,) that are `good`, about smooth curves through the holds."""
+    parts = [(e, Q) for _, e, Q in hold_errors(m, good)]
     if sum(len(e) for e, _ in parts) < 40:
         return ForceNoise(_from_motion(m.force_N[good]), Colour(), False)
-    return _matched(parts)
+    return _matched(parts, float(np.median(np.diff(m.force_time_s))))
 
 
 def _about_curve(t: Array, y: Array) -> tuple[Array, Array]:
-    """(what is left of y about a constant, a line and slow exponentials, the orthonormal basis taken out)."""
+    """(what is left of y about a constant, a line and exponentials, the orthonormal basis taken out)."""
     n = len(y)
     span = t[-1] - t[0]
-    terms = int(np.clip(n // 40, 0, 3))
+    terms = int(np.clip(n // 8, 1, 9))
     basis = [np.ones(n), (t - t[0]) / span]
-    basis += [np.exp(-(t - t[0]) * k / span) for k in (4.0, 12.0, 40.0)[:terms]]
+    basis += [np.exp(-(t - t[0]) / tau) for tau in np.geomspace(2.0 * span / n, 0.6 * span, terms)]
     Q, _ = np.linalg.qr(np.stack(basis, axis=1))
     left = y - y.mean()
     return left - Q @ (Q.T @ left), Q
 
 
-def _matched(parts: list[tuple[Array, Array]]) -> ForceNoise:
+def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     """σ, a and φ for which what the projection leaves has the autocovariance found."""
     longest = max(len(e) for e, _ in parts)
     lags = np.unique(np.concatenate([[0, 1, 2, 3, 5, 8], np.geomspace(10, 200, 8)]).astype(np.intp))
@@ -95,7 +106,8 @@ def _matched(parts: list[tuple[Array, Array]]) -> ForceNoise:
     left = found / sizes
     best = (np.inf, 0.0, 0.0, sigma2)
     if len(lags) > 3 and abs(left[1]) > 3.0 * left[0] / np.sqrt(sizes[1]):
-        for phi in 1.0 - np.geomspace(0.6, 0.002, 28):
+        slowest = float(np.exp(-sample_s / MEMORY_S))
+        for phi in 1.0 - np.geomspace(0.6, max(1.0 - slowest, 1e-4), 28):
             tail = _expected(parts, lags, float(phi))
             A = np.stack([white, tail], axis=1) / sizes[:, None]
             weight = np.sqrt(sizes / sizes[0])

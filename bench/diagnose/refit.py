@@ -14,6 +14,7 @@ from .numbers import Structure
 
 Array = NDArray[np.float64]
 
+RENEWED = 3  # steps for which derivatives are good
 STEP = 1e-5  # of a coordinate of order one, for derivatives
 
 
@@ -72,13 +73,18 @@ def mean_square(data: Data, structure: Structure, x: Array) -> float:
     return float(np.sum(data.weight * e * e) / max(data.weight.sum(), 1.0))
 
 
-def jacobian(data: Data, structure: Structure, x: Array, force: Array | None = None) -> Array:
-    """∂(√w F/σ)/∂x (n, P), one-sided differences away from the bounds."""
+def jacobian(
+    data: Data, structure: Structure, x: Array, force: Array | None = None, known: Array | None = None
+) -> Array:
+    """∂(√w F/σ)/∂x (n, P), one-sided differences away from the bounds; the first columns are those of `known`."""
     scale = np.sqrt(data.weight) / data.sigma_N
     base = force_at(data, structure, x) if force is None else force
     lower, upper = structure.lower, structure.upper
     out = np.empty((data.size, len(x)))
-    for j in range(len(x)):
+    first = 0 if known is None else known.shape[1]
+    if known is not None:
+        out[:, :first] = known
+    for j in range(first, len(x)):
         h = STEP * max(1.0, abs(x[j]))
         if x[j] + h > upper[j] or (x[j] < 0 and x[j] - h >= lower[j]):
             h = -h
@@ -88,27 +94,60 @@ def jacobian(data: Data, structure: Structure, x: Array, force: Array | None = N
     return out
 
 
-def refit(data: Data, structure: Structure, x0: Array, max_steps: int = 40, tolerance: float = 1e-7) -> Fit:
-    """From x0 to the minimum, or as far as `max_steps` go."""
+def refit(
+    data: Data,
+    structure: Structure,
+    x0: Array,
+    max_steps: int = 40,
+    tolerance: float = 1e-7,
+    known: Array | None = None,
+    exact: bool = False,
+) -> Fit:
+    """From x0 to the minimum, or as far as `max_steps` go.
+
+    `known`: derivatives by the first numbers that are near enough to those here, for the first steps of a search.
+    """
     prior = structure.prior
+    scale = np.sqrt(data.weight) / data.sigma_N
+    last: list[Array] = []  # x, force and derivatives of the step before
+    steps = 0
+
+    def derivatives(x: Array, force: Array) -> Array:
+        """By differences at every third step, else carried on by the secant (C. G. Broyden, Math. Comp. 19, 1965)."""
+        nonlocal steps
+        if steps % RENEWED == 0 or not last:
+            J = jacobian(data, structure, x, force, known)
+            J[~np.isfinite(J)] = 0.0
+        else:
+            before, then, J = last
+            way = x - before
+            square = float(way @ way)
+            if square > 0.0:
+                J = J + np.outer((scale * (force - then) - J @ way) / square, way)
+        steps += 1
+        last[:] = [x.copy(), force, J]
+        return J
 
     def normal(x: Array) -> tuple[float, Array, Array]:
         force = force_at(data, structure, x)
-        J = jacobian(data, structure, x, force)
-        J[~np.isfinite(J)] = 0.0
-        e = np.sqrt(data.weight) / data.sigma_N * (data.force_N - force)
+        J = derivatives(x, force)
+        e = scale * (data.force_N - force)
         value = float(e @ e + prior @ x**2)
         return value, J.T @ e - prior * x, J.T @ J + np.diag(prior)
 
     solution = minimise(
         normal, lambda x: chi2(data, structure, x), x0, structure.lower, structure.upper, max_steps, tolerance
     )
+    if exact and steps > 1:  # the matrix says how sure the numbers are
+        J = jacobian(data, structure, solution.x)
+        J[~np.isfinite(J)] = 0.0
+        return Fit(structure, solution.x, solution.cost, J.T @ J + np.diag(prior), solution.converged)
     return Fit(structure, solution.x, solution.cost, solution.matrix, solution.converged)
 
 
 def onto(fit: Fit, data: Data, max_steps: int = 25, tolerance: float = 1e-9) -> Fit:
-    """The same structure carried on with other data."""
-    return refit(data, fit.structure, fit.x, max_steps, tolerance)
+    """The same structure carried on with other data, its matrix by differences at the end."""
+    return refit(data, fit.structure, fit.x, max_steps, tolerance, exact=True)
 
 
 def extended(fit: Fit, structure: Structure, added: Array) -> Array:

@@ -106,7 +106,6 @@ class Diagnosis:
     flagged_fraction: float
     seconds: float
     model_dict: dict[str, Any]
-    rmse_after_unflagged: float
     next_protocol: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
     remainders: list[Remainder] = field(default_factory=list)
@@ -119,7 +118,8 @@ class Diagnosis:
     before_N: Array = field(default_factory=lambda: np.zeros(0))
     after_N: Array = field(default_factory=lambda: np.zeros(0))
     sigma_N: Array = field(default_factory=lambda: np.zeros(0))
-    flagged: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    flags: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
+    """By channel fault, which force samples (m,) have it."""
     counted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     ranking: list[Alternative] = field(default_factory=list)
     """Every candidate for the first cause, best first."""
@@ -143,13 +143,12 @@ class Diagnosis:
             "held_out_before": self.held_out_before,
             "held_out_after": self.held_out_after,
             "flagged_fraction": self.flagged_fraction,
-            "rmse_after_unflagged": self.rmse_after_unflagged,
             "remains": [
                 {"name": r.name, "p_value": r.p_value, "share": r.share, "sentence": r.sentence}
                 for r in self.remainders
                 if r.passed
             ],
-            "flagged_time_s": self.time_s[self.flagged].tolist() if self.flagged.sum() <= 5000 else None,
+            "flags": {name: np.flatnonzero(mask).tolist() for name, mask in self.flags.items() if mask.any()},
             "next_protocol": self.next_protocol,
             "notes": self.notes,
             "seconds": self.seconds,

@@ -7,21 +7,27 @@ best few, all on the short stand-in; what is compared at last has converged.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import Signatures, forms, starts
+from sim.effects import Form
+
+from .candidates import Reach, Signatures, Start, forms, starts
 from .data import Prepared
 from .evidence import Evidence, believable, evidence_of, penalty
-from .numbers import Cause, Structure
-from .refit import Fit, extended, force_at, reduced, refit
+from .numbers import Cause, Structure, cause_of
+from .refit import Fit, extended, force_at, jacobian, reduced, refit
 
 Array = NDArray[np.float64]
 
-FEW, MORE, ALL = 3, 8, 40  # steps of the three rounds
-HALF, BEST = 20, 7  # forms in the second round, ids in the third
+FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
+STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
+WORKERS = 2  # threads: the plant runs without Python's lock
+PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 MOST_CAUSES = 4
 
 
@@ -57,7 +63,14 @@ class Search:
         self.believed = structure
         self.samples = float(prepared.full.weight.sum())
         self.effective = max(self.samples / prepared.colour.memory, 20.0)
-        self.spans = np.bincount(prepared.owner, minlength=self.short.size)
+        full = prepared.full
+        self.reach = Reach(
+            sample_s=prepared.sample_s,
+            span_s=float(full.time_s[-1] - full.time_s[0]),
+            travel_mm=float(np.ptp(full.position_mm)),
+            depth_mm=prepared.depth_mm,
+            force_N=prepared.force_scale_N,
+        )
 
     # --- the believed structure ------------------------------------------------------------------------------------
 
@@ -71,30 +84,88 @@ class Search:
     # --- candidates ------------------------------------------------------------------------------------------------
 
     def ranked(self, fit: Fit, only: Sequence[str] | None = None) -> list[Trial]:
-        """Every candidate joined to a fit: the best form of each id, best first."""
-        data = self.short
-        signatures = Signatures(data, fit)
-        first: list[Trial] = []
-        candidates = [(e, f) for e, f in forms(fit.structure, fit.structure.in_air) if only is None or e.id in only]
-        for number, (effect, form) in enumerate(candidates):
-            self.progress(f"candidate {number + 1} of {len(candidates)}: {effect.id}")
-            joined = [self._joined(fit, s.cause, FEW) for s in starts(data, signatures, effect, form)]
-            tried = [t for t in joined if t is not None]
-            tried += self._from_believed(fit, tried)
-            if tried:
-                first.append(min(tried, key=lambda t: t.score))
-        first.sort(key=lambda t: t.score)
-        second = [self._carried(t, MORE) for t in first[:HALF]]
-        second.sort(key=lambda t: t.score)
-        ids: list[str] = []
-        third: list[Trial] = []
-        for t in second:
-            if t.id not in ids:
-                ids.append(t.id)
-            if ids.index(t.id) < BEST and sum(x.id == t.id for x in third) < 3:
-                third.append(self._carried(t, ALL))
-        rest = [t for t in [*second, *first[HALF:]] if t.id not in {x.id for x in third}]
-        return _best_of_each(third + rest)
+        """The candidates joined to a fit: the best form of each id, best first."""
+        signatures = Signatures(self.short, fit)
+        wanted = [
+            pair
+            for pair in forms(fit.structure, fit.structure.in_air, self.reach)
+            if only is None or pair[0].id in only
+        ]
+        self.progress(f"signatures of {len(wanted)} shapes")
+        by_id: dict[str, list[Start]] = {}
+        family: dict[str, list[Form]] = {}
+        for effect, form in wanted:
+            family.setdefault(effect.id, []).append(form)
+        with ThreadPoolExecutor(WORKERS) as pool:
+            for pair, found in zip(wanted, pool.map(lambda p: starts(signatures, *p), wanted), strict=True):
+                by_id.setdefault(pair[0].id, []).extend(found)
+            promising = self._promising(by_id) if only is None else list(by_id)
+            self.progress(f"{len(promising)} candidates")
+            sieved = dict(
+                zip(promising, pool.map(lambda i: self._sieved(fit, by_id[i], signatures), promising), strict=True)
+            )
+            order = sorted((i for i in promising if sieved[i]), key=lambda i: sieved[i][0].score)
+            wide = list(pool.map(lambda i: self._widened(fit, sieved[i], family[i]), order[:SECOND]))
+            wide.sort(key=lambda trials: trials[0].score)
+            self.progress(f"closer: {', '.join(trials[0].id for trials in wide[:THIRD])}")
+            ended = list(pool.map(lambda trials: [self._carried(t, ALL) for t in trials[:2]], wide[:THIRD]))
+        found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[THIRD:]]]
+        found_all += [sieved[i][0] for i in order[SECOND:]]
+        return sorted(found_all, key=lambda t: t.score)
+
+    def _promising(self, by_id: dict[str, list[Start]]) -> list[str]:
+        """Ids whose first-order signature takes anything worth while, and those that have none."""
+        promise = {id_: max((s.promise for s in found), default=0.0) for id_, found in by_id.items()}
+        finite = [p for p in promise.values() if np.isfinite(p)]
+        least = max(0.01 * max(finite, default=0.0), 8.0 * self.prepared.colour.memory)
+        order = sorted((i for i in promise if promise[i] >= least), key=lambda i: -promise[i])
+        return order[:WORTH]
+
+    def _sieved(self, fit: Fit, found: list[Start], signatures: Signatures) -> list[Trial]:
+        """A few steps from the most promising starts of an id, and once more with the pad as it was believed."""
+        found = sorted(found, key=lambda s: -s.promise)
+        chosen = [s for s in found if np.isinf(s.promise)]
+        forms_seen: dict[str, int] = {}
+        for s in found:
+            seen = forms_seen.get(s.cause.form.name, 0)
+            if np.isfinite(s.promise) and seen < 2 and sum(forms_seen.values()) < STARTS:
+                forms_seen[s.cause.form.name] = seen + 1
+                chosen.append(s)
+        joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen]
+        tried = [t for t in joined if t is not None]
+        tried += self._from_believed(fit, tried)
+        return sorted(tried, key=lambda t: t.score)
+
+    def _widened(self, fit: Fit, trials: list[Trial], family: list[Form]) -> list[Trial]:
+        """More steps for the best, and the other forms of the family from where it ended."""
+        best = self._carried(trials[0], MORE)
+        out = [best, *trials[1:2]]
+        tried = {best.cause.form.name}
+        for form in family:
+            if form.name in tried or (form.amend is not None and best.cause.amplitude is None):
+                continue
+            tried.add(form.name)
+            cause = cause_of(best.cause.effect, form)
+            shared = {p.name for p in cause.fitted} & {p.name for p in best.cause.fitted}
+            values = best.fit.structure.values(best.fit.x)[-1]
+            cause = cause.with_start(**{name: values[name] for name in shared})
+            structure = fit.structure.with_cause(cause)
+            pad = best.fit.x[: len(structure.pad.coordinates)]
+            before = best.fit.structure.values(best.fit.x)[:-1]
+            x = structure.x(pad, [*before, cause.start], _surface_x(best.fit))
+            trial = self._solved(structure, x, MORE, None)
+            if trial is not None:
+                out.append(trial)
+        return sorted(out, key=lambda t: t.score)
+
+    def _plainest(self, trials: list[Trial]) -> Trial:
+        """The best; or a form of fewer numbers that is as good for what there is to explain."""
+        best = trials[0]
+        for t in trials[1:]:
+            fewer = t.fit.free < best.fit.free
+            if fewer and t.fit.chi2 - best.fit.chi2 < PLAIN * self.prepared.colour.memory:
+                best = t
+        return best
 
     def _from_believed(self, fit: Fit, tried: Sequence[Trial]) -> list[Trial]:
         """The best of some starts again, with the pad as it was believed: a refit may have run far from it."""
@@ -103,18 +174,23 @@ class Search:
         best = min(tried, key=lambda t: t.score)
         structure = best.fit.structure
         start = structure.x(self.believed.pad.x(), structure.values(best.fit.x))
-        again = self._solved(structure, start, FEW)
+        again = self._solved(structure, start, FEW, self._believed_jacobian)
         return [] if again is None else [again]
 
-    def _joined(self, fit: Fit, cause: Cause, steps: int) -> Trial | None:
+    @cached_property
+    def _believed_jacobian(self) -> Array:
+        x = self.believed.x(self.believed.pad.x())
+        return jacobian(self.short, self.believed, x)[:, : len(x) - (1 if self.believed.doubt_mm > 0 else 0)]
+
+    def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array) -> Trial | None:
         structure = fit.structure.with_cause(cause)
         own = structure.x(fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
-        return self._solved(structure, extended(fit, structure, own), steps)
+        return self._solved(structure, extended(fit, structure, own), steps, known)
 
-    def _solved(self, structure: Structure, x: Array, steps: int) -> Trial | None:
+    def _solved(self, structure: Structure, x: Array, steps: int, known: Array | None) -> Trial | None:
         if not np.isfinite(force_at(self.short, structure, x)).all():
             return None
-        done = refit(self.short, structure, x, steps, 1e-6)
+        done = refit(self.short, structure, x, steps, 1e-6, known)
         return self._trial(done)
 
     def _trial(self, fit: Fit) -> Trial:
@@ -132,12 +208,12 @@ class Search:
         """Causes one after the other while each pays; then those that others have made needless go."""
         path = Path([base])
         while len(path.fits) <= MOST_CAUSES:
-            now = path.fits[-1]
-            ranked = self.ranked(now)
-            ranked = [t for t in ranked if believable(t.fit, self.prepared)]
+            ranked = [t for t in self.ranked(path.fits[-1]) if believable(t.fit, self.prepared)]
             if not ranked:
                 break
             best = ranked[0]
+            now = path.fits[-1] = self.settled(path.fits[-1], best.fit)
+            base = path.fits[0]
             found = self.judge(now, best.fit, base)
             path.rivals.append(ranked)
             path.evidence.append(found)
@@ -147,6 +223,12 @@ class Search:
             if len(path.fits) > 2:
                 path.fits[-1] = self.exchanged(path)
         return path
+
+    def settled(self, now: Fit, joined: Fit) -> Fit:
+        """The fit before a cause was added, or a better one that the addition has led to: a valley may be long."""
+        structure, x = reduced(joined, len(joined.structure.causes) - 1)
+        again = refit(self.short, structure, x, 20, 1e-8)
+        return again if again.chi2 < now.chi2 else now
 
     def judge(self, before: Fit, after: Fit, base: Fit) -> Evidence:
         """Whether the step from one fit to the next is more than chance, and more than a crumb."""
@@ -175,9 +257,5 @@ class Search:
         return best
 
 
-def _best_of_each(trials: Sequence[Trial]) -> list[Trial]:
-    best: dict[str, Trial] = {}
-    for t in trials:
-        if t.id not in best or t.score < best[t.id].score:
-            best[t.id] = t
-    return sorted(best.values(), key=lambda t: t.score)
+def _surface_x(fit: Fit) -> float:
+    return float(fit.x[-1]) if fit.structure.doubt_mm > 0 else 0.0

@@ -7,11 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .candidates import forms
 from .data import Prepared
 from .held_out import held_out_square
-from .numbers import cause_of
-from .refit import Fit, onto, reduced, refit
+from .refit import Fit, reduced, refit
 from .result import Alternative, CauseFound, Number
 from .search import Path, Search, Trial
 
@@ -47,11 +45,10 @@ def chain(prepared: Prepared, fit: Fit, base: Fit) -> list[Fit]:
     return [base, *reversed(fits)] if len(fit.structure.causes) > own else [base]
 
 
-def excesses(prepared: Prepared, fits: Sequence[Fit]) -> tuple[list[float], list[float]]:
+def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[list[float], list[float]]:
     """(held-out mean squares, those less the noise floor's square and not below 0), N²."""
     squares = [held_out_square(prepared, fit) for fit in fits]
-    floor = prepared.floor_N**2
-    return squares, [max(s - floor, 0.0) for s in squares]
+    return squares, [max(s - floor_N**2, 0.0) for s in squares]
 
 
 def rivals_of(search: Search, path: Path, fits: Sequence[Fit], index: int) -> list[Trial]:
@@ -143,6 +140,3 @@ def explain(effect: object, values: dict[str, float]) -> str:
         return str(effect.explanation(values))  # type: ignore[attr-defined]
     except KeyError:
         return str(effect.what)  # type: ignore[attr-defined]
-
-
-__all__ = ["alternatives", "cause_of", "chain", "excesses", "forms", "found", "onto", "ordered"]

@@ -13,8 +13,8 @@ from .data import Prepared
 from .refit import Fit
 
 
-def model_of(believed: Model, fit: Fit, prepared: Prepared) -> dict[str, Any]:
-    """Pad and effects with the fit's numbers and their standard errors."""
+def model_of(believed: Model, fit: Fit, prepared: Prepared, limit_N: float | None = None) -> dict[str, Any]:
+    """Pad and effects with the fit's numbers and their standard errors; `limit_N`: a ceiling of the force."""
     structure = fit.structure
     pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
     order = np.argsort(-np.array(pad.relaxation.rates), kind="stable")
@@ -46,6 +46,8 @@ def model_of(believed: Model, fit: Fit, prepared: Prepared) -> dict[str, Any]:
                 position += 1
             row[p.name] = quantity
         effects.append(row)
+    if limit_N is not None:
+        effects.append({"id": "saturation", "limit": {"value": abs(limit_N), "unit": "N"}})
     if effects:
         content["effects"] = effects
     return content

@@ -94,6 +94,8 @@ class Form:
     pack: Callable[[Mapping[str, float]], tuple[float, ...]] | None = None
     time_shift: Callable[[Mapping[str, float], Array], Array] | None = None
     """Stamp of a force sample (s) → when that force was felt (s): late or drifting force clocks."""
+    sought: bool = True
+    """Whether a diagnosis tries the form; one that can pass for another cause simulates only."""
     amend: Callable[[Pad, Mapping[str, float]], Pad] | None = None
     """Another pad in place of the one described: another law, a further mode, contact that lets go."""
 

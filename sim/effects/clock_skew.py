@@ -67,6 +67,7 @@ EFFECT = Effect(
                 Parameter("offset", "s", -1.0, 1.0, 0.0, "force clock minus position clock at the first force sample"),
             ),
             time_shift=skewed,
+            sought=False,
         ),
         Form(
             name="ageing",
@@ -76,6 +77,7 @@ EFFECT = Effect(
                 Parameter("doubling", "s", 10.0, 1e6, 100.0, "time in which the skew doubles", starts=(30.0, 300.0)),
             ),
             time_shift=ageing,
+            sought=False,
         ),
     ),
 )

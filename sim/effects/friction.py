@@ -15,6 +15,8 @@ since the last reversal, rises with it, and is a continuous function of position
 
 - `load_dependent`: Prandtl's element whose slider holds F_c (1 + load · δ): guides and seals that bear more the deeper
   the probe stands in the pad (F. P. Bowden, D. Tabor, The Friction and Lubrication of Solids, Oxford, 1950).
+- `maxwell_slip`: five of Prandtl's elements side by side, their distances spread geometrically: the build-up is gradual
+  and remembers inner loops (W. D. Iwan, J. Appl. Mech. 33, 1966, 893–900).
 
 State: last position, force, whether there was a position yet. A first position is rest without friction force.
 """
@@ -27,6 +29,7 @@ from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
 _LAST, _FORCE, _STARTED, _DEPTH = range(4)
+_FIRST, _ELEMENTS = 3, 5
 
 
 @block
@@ -51,6 +54,23 @@ def dahl(dt: float, y: float, state: State, p: State) -> float:
     force = state[_FORCE] + (ceiling - state[_FORCE]) * -math.expm1(-abs(moved) / p[1])
     state[_FORCE] = force
     return force
+
+
+@block
+def maxwell_slip(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's elements side by side, of equal strength; p = (coulomb, presliding, spread)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    limit = p[0] / _ELEMENTS
+    total = 0.0
+    for k in range(_ELEMENTS):
+        reach = p[1] * p[2] ** (k - 0.5 * (_ELEMENTS - 1))
+        force = state[_FIRST + k] + moved * (limit / reach)
+        force = max(-limit, min(limit, force))
+        state[_FIRST + k] = force
+        total += force
+    return total
 
 
 @block
@@ -137,8 +157,8 @@ EFFECT = Effect(
                 Parameter(
                     "stribeck_speed",
                     "mm/s",
-                    1e-3,
-                    1e3,
+                    1e-2,
+                    20.0,
                     2.0,
                     "speed at which the excess at rest has fallen to 1/e",
                     starts=(0.5, 5.0),
@@ -166,6 +186,25 @@ EFFECT = Effect(
             ),
             blocks={"probe": dahl},
             state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="maxwell_slip",
+            what="gradual build-up that remembers inner loops",
+            parameters=(
+                _COULOMB,
+                Parameter(
+                    "presliding",
+                    "mm",
+                    1e-5,
+                    5.0,
+                    0.02,
+                    "distance over which the middle element builds up",
+                    starts=(0.01, 0.06, 0.3),
+                ),
+                Parameter("spread", "1", 1.0, 6.0, 2.0, "ratio of the elements' distances", fixed=True),
+            ),
+            blocks={"probe": maxwell_slip},
+            state=(0.0,) * 8,
         ),
         Form(
             name="load_dependent",

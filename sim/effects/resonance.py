@@ -89,6 +89,7 @@ EFFECT = Effect(
                     "share", "1", -2.0, 2.0, 0.3, "share of the force that rings", amplitude=True, starts=(0.3, -0.3)
                 ),
             ),
+            sought=False,
             blocks={"sensor": partial},
             state=(0.0,) * 4,
         ),

@@ -103,7 +103,7 @@ EFFECT = Effect(
             what="to a power of the speed",
             parameters=(
                 _coefficient("force at 1 mm/s"),
-                Parameter("exponent", "1", 0.1, 2.0, 0.6, "power of the speed in mm/s", starts=(0.4, 0.7, 1.3)),
+                Parameter("exponent", "1", 0.35, 1.6, 0.6, "power of the speed in mm/s", starts=(0.5, 0.7, 1.3)),
             ),
             blocks={"contact": power},
             state=(0.0,),

@@ -1,0 +1,69 @@
+"""What ails the force channel itself, as causes: saturated, stuck and stray samples, and hum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.recording.types import Measurement
+from sim.effects import effect
+
+from .channel import Faults
+from .data import Prepared
+from .hum import Line
+from .numbers import Cause, cause_of
+from .refit import Fit
+from .result import CauseFound, Number
+from .verdict import described
+
+Array = NDArray[np.float64]
+
+FEWEST = 3  # stray samples that are called a fault
+
+
+def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: Array, final: Fit) -> list[CauseFound]:
+    """Each with its `gain` still in N²: the mean square that flagged samples or hum add to the error before."""
+    at = prepared.at
+    counted = (m.force_time_s[-len(at) :] >= m.fit_from_s) & (m.force_time_s[-len(at) :] <= m.fit_to_s)
+    error = (prepared.raw.force_N - before_N)[at]
+    n = max(len(at), 1)
+    out = []
+    if prepared.hum is not None:
+        hum = prepared.hum.force_N((prepared.full.time_s - prepared.full.time_s[0])[at][counted])
+        id_, form, numbers = described(final, len(final.structure.causes) - 1, prepared.colour.memory**0.5)
+        out.append(_named(id_, form, numbers, float(np.sum(hum**2)) / n))
+    masks = {"saturation": flags.saturated, "stuck_samples": flags.stuck, "outliers": flags.outlier}
+    for id_, mask in masks.items():
+        mask = mask[-len(at) :] & counted
+        count = int(mask.sum())
+        if count < FEWEST:
+            continue
+        if id_ == "saturation":
+            numbers = {"limit": Number(float(flags.limit_N or 0.0), "N", prepared.noise.force_N / np.sqrt(count))}
+        else:
+            share = count / n
+            numbers = {"fraction": Number(share, "1", float(np.sqrt(share * (1 - share) / n)))}
+        out.append(_named(id_, effect(id_).forms[0].name, numbers, float(np.sum(error[mask] ** 2)) / n))
+    return out
+
+
+def _named(id_: str, form: str, numbers: Mapping[str, Number], square: float) -> CauseFound:
+    cause = effect(id_)
+    values = {name: number.value for name, number in numbers.items()}
+    try:
+        words = cause.explanation(values)
+    except KeyError:
+        words = cause.what
+    return CauseFound(id_, form, dict(numbers), square, 0.99, [], words, cause.check)
+
+
+def hum_cause(line: Line) -> Cause:
+    """The effect that makes the line."""
+    hum = effect("mains_hum")
+    values = {"amplitude": line.amplitude_N, "frequency": line.frequency_Hz, "phase": line.phase_rad}
+    if line.ratio > 0.0:
+        third = {"ratio": line.ratio, "third_phase": line.third_phase_rad}
+        return cause_of(hum, hum.form("harmonics"), values | third)
+    return cause_of(hum, hum.form("sine"), values)
