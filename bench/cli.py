@@ -26,6 +26,7 @@ COMMANDS = {
     "compare": "several runs side by side",
     "convert": "MCAP to CSV and back",
     "recover": "make a whole recording of a torn one",
+    "diagnose": "what a model gets wrong about measured data, and why",
     "export": "a fitted pad for other programs: C header for real-time loops, or JSON",
     "paper": "remake the paper's figures and tables, and say what comes out of its findings",
     "schema": "print the JSON schema of a protocol, bench or model file",

@@ -57,17 +57,18 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
 def _over_data(args: argparse.Namespace, model: Model) -> int:
     import numpy as np
 
+    from bench.like import likeness
     from bench.recording import write_csv
 
     measured = read_data(args, args.like)[0].measurement()
     t, x, force_t = measured.position_time_s, measured.position_mm, measured.force_time_s
-    force = model.simulate_at(t, x, force_t)
+    like = likeness(model, measured)
+    force = like.force_N
     if force_t.size == t.size and not np.array_equal(force_t, t):
         # Two clocks with a force for every position: row by row as the data have it.
         write_csv(args.out, t, x, t, force, extra={"force_time_s": (t, force_t)})
     else:
         write_csv(args.out, t, x, force_t, force)
-    counted = (force_t >= measured.fit_from_s) & (force_t <= measured.fit_to_s)
-    error = np.sqrt(np.mean((measured.force_N - force)[counted] ** 2))
-    print(f"wrote {args.out}: {force.size} samples; RMS difference to the data {error:.6g} N")
+    said = f"; {like.sentence}" if like.sentence else ""
+    print(f"wrote {args.out}: {force.size} samples; RMS difference to the data {like.rmse_N:.6g} N{said}")
     return EXIT_DONE

@@ -26,8 +26,9 @@ Array = NDArray[np.float64]
 
 CHANNEL = ("outliers", "stuck_samples", "mains_hum")  # found by detectors, not by fitting
 MOST_STARTS = 96
-PERIODS = 24
+PERIODS = 22
 MANY = 20
+LONGEST_PERIOD = 0.9  # of the travel: a longer one is another law, not a period
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,8 @@ def _narrowed(p: Parameter, reach: Reach) -> Parameter:
     elif p.unit == "s" and p.logarithmic:
         upper = min(upper, 3.0 * reach.span_s)
     elif p.name == "period":
-        lower, upper = max(lower, 0.03 * reach.travel_mm), min(upper, 3.0 * reach.travel_mm)
-        starts = tuple((reach.travel_mm / np.linspace(0.45, 10.0, PERIODS)).tolist())
+        lower, upper = max(lower, 0.03 * reach.travel_mm), min(upper, LONGEST_PERIOD * reach.travel_mm)
+        starts = tuple((reach.travel_mm / np.linspace(1.12, 12.0, PERIODS)).tolist())
     elif p.name == "reach":
         default = reach.depth_mm
     elif p.name == "limit" and p.unit == "N":

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
-from .motion import resolution
+from bench.felt_motion import resolution
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -150,10 +150,10 @@ def standing_off(residual: Array, good: Mask) -> Mask:
     if len(index) < 30:
         return mask
     e = residual[index]
-    padded = np.pad(e, 2, mode="edge")
-    around = np.stack([padded[k : k + len(e)] for k in (0, 1, 3, 4)])
+    padded = np.pad(e, 4, mode="edge")
+    around = np.stack([padded[k : k + len(e)] for k in (0, 1, 2, 3, 5, 6, 7, 8)])
     off = np.abs(e - np.median(around, axis=0))
     calm = np.sort(np.abs(around - np.median(around, axis=0)), axis=0)[-2]
     limit = far(e - np.median(around, axis=0))
-    mask[index[off > limit + 3.0 * calm]] = True
+    mask[index[off > limit + 4.0 * calm]] = True
     return mask

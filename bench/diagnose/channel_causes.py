@@ -26,7 +26,7 @@ FEWEST = 3  # stray samples that are called a fault
 def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: Array, final: Fit) -> list[CauseFound]:
     """Each with its `gain` still in N²: the mean square that flagged samples or hum add to the error before."""
     at = prepared.at
-    counted = (m.force_time_s[-len(at) :] >= m.fit_from_s) & (m.force_time_s[-len(at) :] <= m.fit_to_s)
+    counted = m.counted()[prepared.kept]
     error = (prepared.raw.force_N - before_N)[at]
     n = max(len(at), 1)
     out = []
@@ -36,7 +36,7 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
         out.append(_named(id_, form, numbers, float(np.sum(hum**2)) / n))
     masks = {"saturation": flags.saturated, "stuck_samples": flags.stuck, "outliers": flags.outlier}
     for id_, mask in masks.items():
-        mask = mask[-len(at) :] & counted
+        mask = mask[prepared.kept] & counted
         count = int(mask.sum())
         if count < FEWEST:
             continue

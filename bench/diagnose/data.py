@@ -7,19 +7,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.errors import InputError
+from bench.felt_motion import felt, resolution
 from bench.identify.noise import stiffness_along
-from bench.identify.problem import build
 from bench.recording.types import Measurement
 from sim.jit import compiled
+from sim.pad import union
 
 from .hum import Line, find
-from .motion import felt, position_noise, resolution
 from .noise import Colour, ForceNoise, force_noise, hold_errors
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 BLOCKS, FOLDS = 20, 5
+FEWEST = 20  # force samples
 SHORT = 1500  # samples that need no stand-in
 TARGET = 4000  # samples of the stand-in, where its blocks can be that long
 
@@ -59,6 +61,8 @@ class Prepared:
     short: Data
     owner: NDArray[np.intp]
     at: NDArray[np.intp]
+    kept: Mask
+    """Of the measurement's force samples, those within the time of the positions: they are the ones `at` the grid."""
     noise: ForceNoise
     hum: Line | None
     """What hums, and has been taken out of the force."""
@@ -88,53 +92,61 @@ class Prepared:
         return float(np.sqrt(np.sum(w * self.full.sigma_N**2) / max(w.sum(), 1.0)))
 
 
-def prepare(m: Measurement, good: Mask) -> Prepared:
-    """Grid, noise and stand-in. `good` (m,): force samples that are not channel faults.
-
-    Raises InputError as a fit does, for data that cannot be fitted at all.
+def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
+    """Grid, noise and stand-in. `good` (m,): force samples that are not channel faults; `between`: with the motion
+    between samples rebuilt. Raises InputError where there is next to nothing to work on.
     """
-    line = find(float(m.position_time_s[0]), float(np.median(np.diff(m.force_time_s))), hold_errors(m, good))
+    inside = (m.force_time_s >= m.position_time_s[0]) & (m.force_time_s <= m.position_time_s[-1])
+    if not inside.all():
+        m = replace(m, force_time_s=m.force_time_s[inside], force_N=m.force_N[inside])
+        good = good[inside]
+    counted = m.counted() & good
+    if counted.sum() < FEWEST:
+        raise InputError(
+            m.name, f"only {int(counted.sum())} force samples can be used", f"At least {FEWEST} are needed."
+        )
+    sample_s = float(np.median(np.diff(m.force_time_s)))
+    line = find(float(m.position_time_s[0]), sample_s, hold_errors(m, good))
     if line is not None:
         m = replace(m, force_N=m.force_N - line.force_N(m.force_time_s - m.position_time_s[0]))
-    position_sigma = position_noise(m.position_mm)
-    positions, left = felt(m.position_time_s, m.position_mm)
+    motion = felt(m.position_time_s, m.position_mm)
     noise = force_noise(m, good)
-    step = resolution(m.force_N)
-    sigma_force = max(noise.force_N, step / np.sqrt(12.0), 1e-9)
-    problem = build([replace(m, position_mm=positions)])
-    run, where = problem.runs[0], problem.where[0]
-    m = problem.measurements[0]
-    good = good[-len(m.force_N) :] if len(good) != len(m.force_N) else good
+    sigma_force = max(noise.force_N, resolution(m.force_N) / np.sqrt(12.0), 1e-9)
+    time, position = (motion.time_s, motion.position_mm) if between else (m.position_time_s, m.position_mm)
+    grid, where = union(time, m.force_time_s)
     stiffness = stiffness_along(m)
-    through = stiffness * np.interp(m.force_time_s, m.position_time_s, left[: len(m.position_time_s)])
-    sigma = np.full(run.size, sigma_force)
+    through = stiffness * np.interp(m.force_time_s, motion.time_s, motion.std_mm)
+    sigma, weight, force = np.full(len(grid), sigma_force), np.zeros(len(grid)), np.zeros(len(grid))
     sigma[where] = np.sqrt(sigma_force**2 + through**2)
-    weight = run.weight.copy()
-    weight[where[~good]] = 0.0
-    time, position, force = run.time_s, run.u * problem.depth_mm, run.y * problem.force_N
-    fold = _folds(time, position, weight, problem.depth_mm)
-    full = Data(time, position, force, weight, sigma, fold)
-    owner = _blocks(full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(left, 0.9)))
+    weight[where] = counted
+    force[where] = m.force_N
+    position = np.interp(grid, time, position)
+    depth = max(float(position.max()), 1e-3)
+    full = Data(grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))))
+    owner = _blocks(
+        full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(motion.std_mm, 0.9))
+    )
     return Prepared(
         name=m.name,
         full=full,
         short=_averaged(full, owner),
         owner=owner,
         at=where,
+        kept=inside,
         noise=replace(noise, force_N=sigma_force),
         hum=line,
-        position_noise_mm=position_sigma,
-        sample_s=float(np.median(np.diff(m.force_time_s))),
+        position_noise_mm=motion.noise_mm,
+        sample_s=sample_s,
         doubt_mm=m.surface_std_mm,
-        depth_mm=problem.depth_mm,
-        force_scale_N=problem.force_N,
+        depth_mm=depth,
+        force_scale_N=max(float(np.abs(m.force_N[counted]).max()), 1e-6),
     )
 
 
-def _folds(time: Array, position: Array, weight: Array, depth_mm: float) -> NDArray[np.intp]:
+def _folds(position: Array, weight: Array, travel_mm: float) -> NDArray[np.intp]:
     """Contiguous blocks dealt out in turn; half by samples and half by travel, so that fast moves are spread too."""
     travel = np.abs(np.diff(position, prepend=position[0]))
-    travel[travel < 2e-3 * depth_mm] = 0.0
+    travel[travel < 2e-3 * travel_mm] = 0.0
     along = np.cumsum(weight / max(weight.sum(), 1.0) / 2 + travel / max(travel.sum(), 1e-300) / 2)
     return np.minimum((along * BLOCKS).astype(np.intp), BLOCKS - 1) % FOLDS
 

@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 TOLD = 0.002  # of the noise power
+NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
+RIVALS = 4  # models of the best single causes that are kept
 
 
 def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | None = None) -> Diagnosis:
@@ -111,9 +113,11 @@ def _asked_again(
 ) -> tuple[Prepared, Faults, Search, Path]:
     """Channel faults against the model found; where that changes which samples count, the fits are carried on."""
     fit = path.fits[-1]
+    if mean_square(prepared.full, fit.structure, fit.x) > (NEAR * prepared.floor_N) ** 2:
+        return prepared, flags, search, path  # against a wrong model transients look like outliers
     residual = prepared.full.force_N - force_at(prepared.full, fit.structure, fit.x)
     errors = np.full(len(m.force_N), np.nan)
-    errors[-len(prepared.at) :] = residual[prepared.at]
+    errors[prepared.kept] = residual[prepared.at]
     known = np.isfinite(errors) & ~(flags.saturated | flags.stuck)
     outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known)
     if outlier.sum() == flags.outlier.sum() and np.array_equal(outlier, flags.outlier):
@@ -147,8 +151,8 @@ def _concluded(
         verdict = "explained" if left <= EXPLAINED else "unexplained"
     else:
         verdict = "unexplained" if told and excess[0] > TOLD * floor**2 else "consistent"
-    flagged = ~flags.good[-len(at) :]
-    inside = _counted(m, at)
+    flagged = ~flags.good[prepared.kept]
+    inside = m.counted()[prepared.kept]
     good = raw.weight[at] > 0
     return Diagnosis(
         verdict=verdict,
@@ -171,22 +175,11 @@ def _concluded(
         before_N=before[at],
         after_N=after[at],
         sigma_N=full.sigma_N[at],
-        flags={
-            name: mask[-len(at) :]
-            for name, mask in (
-                ("saturation", flags.saturated),
-                ("stuck_samples", flags.stuck),
-                ("outliers", flags.outlier),
-            )
-        },
+        flags={"saturation": flags.saturated, "stuck_samples": flags.stuck, "outliers": flags.outlier},
         counted=good,
         ranking=_ranking(path),
+        rivals=[(t.id, model_of(believed, t.fit, prepared)) for t in (path.rivals[0][:RIVALS] if path.rivals else [])],
     )
-
-
-def _counted(m: Measurement, at: NDArray[np.intp]) -> Mask:
-    time = m.force_time_s[-len(at) :]
-    return np.asarray((time >= m.fit_from_s) & (time <= m.fit_to_s))
 
 
 def _ranking(path: Path) -> list[Alternative]:

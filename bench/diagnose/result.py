@@ -123,6 +123,8 @@ class Diagnosis:
     counted: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     ranking: list[Alternative] = field(default_factory=list)
     """Every candidate for the first cause, best first."""
+    rivals: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
+    """(id, model file's content) of the best single causes, refitted: what a next test would have to tell apart."""
 
     @property
     def model(self) -> Model:

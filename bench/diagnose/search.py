@@ -28,7 +28,7 @@ FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
 WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
-MOST_CAUSES = 4
+MOST_CAUSES = 3
 
 
 @dataclass(frozen=True)

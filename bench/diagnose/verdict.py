@@ -46,9 +46,15 @@ def chain(prepared: Prepared, fit: Fit, base: Fit) -> list[Fit]:
 
 
 def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[list[float], list[float]]:
-    """(held-out mean squares, those less the noise floor's square and not below 0), N²."""
+    """(held-out mean squares, those less the noise floor's square), N²; what is within chance of 0 counts as 0."""
     squares = [held_out_square(prepared, fit) for fit in fits]
-    return squares, [max(s - floor_N**2, 0.0) for s in squares]
+    n, memory = float(prepared.full.weight.sum()), prepared.colour.memory
+    out = []
+    for number, (square, fit) in enumerate(zip(squares, fits, strict=True)):
+        doubt = floor_N**2 * (2.0 * np.sqrt(2.0 * memory / n) + 2.0 * fit.free * memory / n)
+        excess = square - floor_N**2
+        out.append(max(excess, 0.0) if number == 0 or excess > doubt else 0.0)
+    return squares, out
 
 
 def rivals_of(search: Search, path: Path, fits: Sequence[Fit], index: int) -> list[Trial]:

@@ -66,8 +66,11 @@ def _blocks(run: Run, stretches: list[slice], length: int, growth: float) -> NDA
 def _averaged(run: Run, owner: NDArray[np.intp]) -> Run:
     count = np.bincount(owner).astype(float)
     weight = np.asarray(np.bincount(owner, run.weight), dtype=np.float64)
-    time = np.bincount(owner, run.time_s) / count
-    u = np.bincount(owner, run.u) / count
+    # Where a block has forces, its time and depth are theirs: nodes without force must not pull them away.
+    share = np.where(weight[owner] > 0, run.weight, 1.0)
+    count = np.where(weight > 0, weight, count)
+    time = np.bincount(owner, share * run.time_s) / count
+    u = np.bincount(owner, share * run.u) / count
     with np.errstate(invalid="ignore"):
         y = np.where(weight > 0, np.bincount(owner, run.weight * run.y) / weight, 0.0)
-    return Run(time, np.diff(time, prepend=time[0]), u, y, weight, run.surface)
+    return Run(time, np.diff(time, prepend=time[0]), u, y, weight, run.surface, run.past)

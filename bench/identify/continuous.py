@@ -14,18 +14,23 @@ import numpy as np
 from bench.errors import InputError
 from bench.recording.types import Measurement
 
-from . import notes, objective
+from . import notes
 from .laws import Family, exponential, polynomial, power
-from .noise import noise_of
+from .noise import Noise, noise_of
 from .parameters import model_dict, parameters
+from .past import with_pasts
+from .path import straightened
+from .points import points
 from .problem import Problem, build
 from .profile import not_told
-from .result import Evidence, FitResult, Trace
-from .select import Candidate, Choice, choose
+from .result import Evidence, FitResult
+from .select import Choice, choose
+from .unformed import with_points
 from .surface import doubtful, moved_mm, with_surfaces
+from .traces import figures_of, traces_of
 from .uncertainty import spread_of
 
-LAWS = ("exponential", "power", "polynomial")
+LAWS = ("exponential", "power", "polynomial", "spline")
 ORDERS = (1, 2, 3, 4)
 DEGREES = (2, 3, 4)  # tried where the degree of a polynomial is not given
 MOST_ORDERS = 8
@@ -46,26 +51,32 @@ def fit(
     contacts = {"auto": (True, False), "unilateral": (True,), "bonded": (False,)}.get(contact)
     if contacts is None:
         raise InputError("--contact", f"there is no contact `{contact}`", "One of: auto, bonded, unilateral.")
-    problem = build(measurements)
+    problem = build(measurements, between=True, blocks=True)
     noise = noise_of(problem.measurements)
-    problem = doubtful(problem, noise.floor_N)
-    families = [with_surfaces(family, problem) for family in families]
-    choice = choose(problem, families, orders, contacts, progress or (lambda _: None))
+    problem, choice = _chosen(problem, noise, families, orders, contacts, progress)
+    if problem.rebuilt:
+        plain = with_pasts(doubtful(build(measurements, blocks=True), noise.floor_N), noise)
+        on_lines = straightened(plain, choice)
+        if on_lines is True:
+            problem, choice = _chosen(plain, noise, families, orders, contacts, progress)
+        elif on_lines:
+            problem, choice = plain, on_lines
+    if law == "auto" and degree is None:
+        choice = with_points(problem, choice, orders, progress or (lambda _: None))
     best = choice.best.estimate
     spread = spread_of(problem, best)
     found, covariance, undetermined = parameters(problem, best, spread)
     relative = {
-        n: p.std / p.value for n, p in found.items() if n[:2] in ("c_", "nu") and np.isfinite(p.std) and p.value
+        n: p.std / p.value if p.value else math.nan for n, p in found.items() if n.startswith(("c_", "nu_"))
     }
     loose = not_told(problem, best, relative, spread.samples) if best.physical else set()
-    undetermined = [name for name in found if name in undetermined or name in loose]
-    traces = _traces(problem, choice.best)
+    loose |= set(undetermined)
+    loose |= {"nu" + name[1:] for name in loose if name.startswith("c_")}  # a share that may be nothing has no rate
+    undetermined = [name for name in found if name in loose]
+    traces = traces_of(problem, best)
+    samples, V, fit_percent = figures_of(traces)
     structure = best.structure
-    unit = problem.force_N**2
-    force = np.concatenate([t.force_N[t.counted] for t in traces])
-    error = np.concatenate([t.residual_N[t.counted] for t in traces])
-    variation = float(np.linalg.norm(force - force.mean()))
-    V = float(np.mean(error**2))
+    unit, within = problem.force_N**2, problem.scatter / problem.weight
     return FitResult(
         method="continuous",
         law=structure.family.name,
@@ -76,22 +87,37 @@ def fit(
         filter=None,
         V=V,
         noise_floor=noise.floor_N,
-        fit_percent=100 * (1 - float(np.linalg.norm(error)) / variation) if variation > 0 else 0.0,
+        fit_percent=fit_percent,
         physical=best.physical,
         converged=best.converged,
         undetermined=undetermined,
-        held_out_rmse=math.sqrt(choice.best.held_out_square * unit),
-        samples=len(force),
+        held_out_rmse=math.sqrt((choice.best.held_out_square + within) * unit),
+        samples=samples,
         seconds=time.perf_counter() - begun,
         degree=structure.family.degree or None,
         traces=traces,
-        evidence=_evidence(choice, unit),
+        evidence=_evidence(choice, unit, within),
         notes=notes.about_data(problem, noise, structure.unilateral) + notes.about_fit(problem, best),
         noise=noise,
         independent_samples=spread.samples,
         covariance=covariance,
         surface_moved_mm=moved_mm(problem, structure.family, structure.split(best.x)[0]),
     )
+
+
+def _chosen(
+    problem: Problem,
+    noise: Noise,
+    families: Sequence[Family],
+    orders: Sequence[int],
+    contacts: Sequence[bool],
+    progress: Callable[[str], None] | None,
+) -> tuple[Problem, Choice]:
+    problem = with_pasts(doubtful(problem, noise.floor_N), noise)
+    said = progress or (lambda _: None)
+    given: Sequence[Family] = families or points(problem, contacts[0])
+    choice = choose(problem, [with_surfaces(f, problem) for f in given], orders, contacts, said)
+    return problem, choice
 
 
 def _families(law: str, degree: int | None) -> list[Family]:
@@ -105,6 +131,8 @@ def _families(law: str, degree: int | None) -> list[Family]:
     if law == "polynomial":
         return several
     named = {"exponential": [exponential()], "power": [power()]}
+    if law == "spline":
+        return []  # its depths come from the data
     return named[law] if law != "auto" else [exponential(), power(), *several]
 
 
@@ -120,17 +148,7 @@ def _orders(order: int | str) -> tuple[int, ...]:
     return (r,)
 
 
-def _traces(problem: Problem, best: Candidate) -> list[Trace]:
-    simulated = objective.forces(problem, best.estimate.structure, best.estimate.x)
-    out = []
-    for m, run, at, (force, _, _) in zip(problem.measurements, problem.runs, problem.where, simulated, strict=True):
-        position = run.u[at] * problem.depth_mm
-        model = force[at] * problem.force_N
-        out.append(Trace(m.name, m.force_time_s, position, m.force_N, model, run.weight[at] > 0))
-    return out
-
-
-def _evidence(choice: Choice, unit: float) -> list[Evidence]:
+def _evidence(choice: Choice, unit: float, within: float) -> list[Evidence]:
     ranked = sorted(choice.candidates, key=lambda c: c.criterion)
     least = ranked[0].criterion
     out = []
@@ -143,9 +161,9 @@ def _evidence(choice: Choice, unit: float) -> list[Evidence]:
                 order=s.order,
                 contact="unilateral" if s.unilateral else "bonded",
                 size=c.size,
-                V=c.V * unit,
+                V=(c.V + within) * unit,
                 criterion=c.criterion - least,
-                held_out_rmse=math.sqrt(c.held_out_square * unit),
+                held_out_rmse=math.sqrt((c.held_out_square + within) * unit),
                 eligible=c.eligible,
                 chosen=c is choice.best,
             )

@@ -79,7 +79,8 @@ def _different(solutions: list[Solution]) -> list[Solution]:
 
 
 def _ordered(structure: Structure, s: Solution, bounds: Bounds) -> Estimate:
-    k, r = structure.family.size, structure.order
+    k, r = structure.shape_size, structure.order
     by_rate = np.argsort(-s.x[k : k + r], kind="stable")
-    order = np.concatenate([np.arange(k), k + by_rate, [k + r], k + r + 1 + by_rate]).astype(np.intp)
+    pasts = [structure.past(j).start + by_rate for j in range(structure.pasts)]
+    order = np.concatenate([np.arange(structure.family.size), *pasts, k + by_rate, [k + r], k + r + 1 + by_rate]).astype(np.intp)
     return Estimate(structure, s.x[order], s.cost, s.matrix[np.ix_(order, order)], s.converged, bounds)

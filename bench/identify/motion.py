@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.recording.types import Measurement
 from sim.jit import compiled
 
 from ._kernel import Array
 
 MIN_HOLD = 8  # samples
+LONG = 600_000  # samples of a channel beyond which a run is worked on in blocks and at a glance
+WINDOWS = 100_000  # that noise is judged on
+
+
+def glanced(m: Measurement) -> Measurement:
+    """Every so many samples of a long measurement, for what is asked of it as a whole."""
+    p, f = (max(1, n // (LONG // 2)) for n in (len(m.position_time_s), len(m.force_time_s)))
+    if p == f == 1:
+        return m
+    position, force = (m.position_time_s[::p], m.position_mm[::p]), (m.force_time_s[::f], m.force_N[::f])
+    return replace(
+        m, position_time_s=position[0], position_mm=position[1], force_time_s=force[0], force_N=force[1]
+    )
 
 
 def jitter(position: Array) -> float:
@@ -21,7 +37,7 @@ def jitter(position: Array) -> float:
     n = len(position) // 6
     if n < 4:
         return 0.0
-    windows = position[: 6 * n].reshape(n, 6)
+    windows = position[: 6 * n].reshape(n, 6)[:: max(1, n // WINDOWS)]
     t = np.arange(6) - 2.5
     level = windows.mean(axis=1, keepdims=True)
     slope = (windows @ t / (t @ t))[:, None]

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from bench.recording.types import Measurement
 
 from ._kernel import Array
-from .motion import holds, jitter
+from .motion import glanced, holds, jitter
 
+LEVELS = 500_000  # samples whose resolution is looked at
 HOLD = 3000  # samples of a hold that are looked at
 DEPTHS = 12  # bins of depth over which the stiffness is estimated
 
@@ -49,11 +50,11 @@ def noise_of(measurements: list[Measurement] | tuple[Measurement, ...]) -> Noise
     if from_holds:
         squares = _trimmed_square(np.concatenate(errors))
     else:
-        squares = float(np.mean([_about_parabolas(m.force_N) ** 2 for m in measurements]))
-    resolution = min(_resolution(m.force_N) for m in measurements)
+        squares = float(np.mean([_about_parabolas(m.force_N[:LEVELS]) ** 2 for m in measurements]))
+    resolution = min(_resolution(m.force_N[:LEVELS]) for m in measurements)
     force = float(np.sqrt(max(squares, resolution**2 / 12)))
     position = float(np.sqrt(np.mean([jitter(m.position_mm) ** 2 for m in measurements])))
-    through = np.concatenate([stiffness_along(m) for m in measurements]) if position > 0 else np.zeros(1)
+    through = np.concatenate([stiffness_along(glanced(m)) for m in measurements]) if position > 0 else np.zeros(1)
     floor = float(np.sqrt(force**2 + position**2 * np.mean(through**2)))
     return Noise(force, position, floor, from_holds)
 

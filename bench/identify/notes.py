@@ -8,8 +8,9 @@ from bench.recording.types import Measurement
 
 from ._kernel import Array
 from .estimate import NOTHING, Estimate
-from .motion import holds
+from .motion import glanced, holds
 from .noise import Noise
+from .past import begins_loaded
 from .problem import Problem
 from .surface import moved_mm
 
@@ -18,10 +19,11 @@ def about_data(problem: Problem, noise: Noise, unilateral: bool) -> list[str]:
     """What is wrong or missing in the data themselves. `unilateral`: a pad that lets go shows no force in air."""
     out = list(problem.notes)
     several = len(problem.measurements) > 1
-    for m in problem.measurements:
+    measurements = [glanced(m) for m in problem.measurements]
+    for m in measurements:
         found = [*m.notes, *_about(m, noise, unilateral)]
         out += [f"{m.name}: {line}" for line in found] if several else found
-    speeds = np.concatenate([_move_speeds(m, problem.depth_mm) for m in problem.measurements])
+    speeds = np.concatenate([_move_speeds(m, problem.depth_mm) for m in measurements])
     if len(speeds) and speeds.max() < 1.5 * speeds.min():
         out.append(
             f"All moves are at one speed ({np.median(speeds):.3g} mm/s): what other speeds do rests on the model."
@@ -71,10 +73,10 @@ def _first_level(force: Array, depth: Array) -> float:
 def _level_notes(m: Measurement, depth: Array, noise: Noise, top: float, unilateral: bool) -> list[str]:
     start, begun = _first_level(m.force_N, depth), float(depth[0])
     large = max(6 * noise.force_N, 0.01 * top)
-    if begun > 0.02 * depth.max() and abs(start) > large:
+    if begins_loaded(m, float(depth.max()), top, noise):
         return [
-            f"The data begin at {begun:.3g} mm with {start:.3g} N on the pad: the model starts from rest there,"
-            " its past is not known."
+            f"The data begin at {begun:.3g} mm with {start:.3g} N on the pad: its past is not known, and the state it"
+            " had left was fitted with it."
         ]
     out = []
     air = depth < -0.002 * np.ptp(depth)

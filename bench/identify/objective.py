@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,26 +12,41 @@ from numpy.typing import NDArray
 from . import _kernel
 from ._kernel import Array
 from .laws import Family
-from .problem import Problem, Run
+from .runs import Run
+
+if TYPE_CHECKING:
+    from .problem import Problem
 
 
 @dataclass(frozen=True)
 class Structure:
-    """What is being fitted: law, order r, contact. x = [θ (k), log ν (r), a (r+1)], ν in 1/s."""
+    """What is being fitted: law, order r, contact. x = [θ (k), η (pasts·r), log ν (r), a (r+1)], ν in 1/s."""
 
     family: Family
     order: int
     unilateral: bool
+    pasts: int = 0
+    """Runs that begin loaded: each has r numbers η, its state beyond that of a pad just pressed (`past`)."""
 
     @property
     def size(self) -> int:
         """Length of x."""
-        return self.family.size + 2 * self.order + 1
+        return self.shape_size + 2 * self.order + 1
+
+    @property
+    def shape_size(self) -> int:
+        """Length of x before the rates."""
+        return self.family.size + self.pasts * self.order
+
+    def past(self, which: int) -> slice:
+        """Where one run's η are in x."""
+        first = self.family.size + which * self.order
+        return slice(first, first + self.order)
 
     def split(self, x: Array) -> tuple[Array, Array, Array]:
         """θ (k,), ν (r,), a (r+1,)."""
-        k, r = self.family.size, self.order
-        return x[:k], np.exp(x[k : k + r]), x[k + r :]
+        k, r = self.shape_size, self.order
+        return x[: self.family.size], np.exp(x[k : k + r]), x[k + r :]
 
 
 @dataclass(frozen=True)
@@ -44,21 +60,43 @@ class Piece:
     let_go: NDArray[np.bool_]
 
 
+class Simulation:
+    """The model on one run from its beginning, carried on from piece to piece."""
+
+    def __init__(self, structure: Structure, x: Array, run: Run) -> None:
+        self.structure, self.run = structure, run
+        self._theta, self._rates, self._weights = structure.split(x)
+        r, P = structure.order, structure.size
+        self._state, self._d_state = np.zeros(r + 1), np.zeros((r + 1, P))
+        self._coupled = np.zeros(1, dtype=np.int64)
+        self._at = 0
+        if run.past is not None:
+            mine = structure.past(run.past)
+            self._state[1:] = x[mine]
+            self._d_state[np.arange(1, r + 1), np.arange(mine.start, mine.stop)] = 1.0
+
+    def over(self, dt_s: Array, u: Array, derivatives: bool = False) -> Piece:
+        """The next n samples: time since the one before each, and depth over D."""
+        structure, n = self.structure, len(u)
+        s, ds = structure.family.of_run(u, self._theta, self.run.surface, derivatives)
+        if structure.pasts:
+            ds = np.hstack([ds, np.zeros((n, structure.pasts * structure.order))])
+        force, elastic, gone = np.empty(n), np.empty(n), np.empty(n, dtype=np.bool_)
+        jacobian = np.empty((n, structure.size) if derivatives else (0, 0))
+        _kernel.advance(
+            dt_s, s, ds, self._rates, self._weights, structure.unilateral,
+            self._state, self._d_state, self._coupled, force, elastic, jacobian, gone,
+        )  # fmt: skip
+        at = slice(self._at, self._at + n)
+        self._at += n
+        return Piece(at, force, elastic, jacobian, gone)
+
+
 def simulate(run: Run, structure: Structure, x: Array, derivatives: bool = False) -> Iterator[Piece]:
     """The model on a run from rest, chunk by chunk."""
-    theta, rates, weights = structure.split(x)
-    r, P = structure.order, structure.size
-    state, d_state, coupled = np.zeros(r + 1), np.zeros((r + 1, P)), np.zeros(1, dtype=np.int64)
+    simulation = Simulation(structure, x, run)
     for at in run.chunks():
-        n = at.stop - at.start
-        s, ds = structure.family.of_run(run.u[at], theta, run.surface, derivatives)
-        force, elastic, gone = np.empty(n), np.empty(n), np.empty(n, dtype=np.bool_)
-        jacobian = np.empty((n, P) if derivatives else (0, 0))
-        _kernel.advance(
-            run.dt_s[at], s, ds, rates, weights, structure.unilateral,
-            state, d_state, coupled, force, elastic, jacobian, gone,
-        )  # fmt: skip
-        yield Piece(at, force, elastic, jacobian, gone)
+        yield simulation.over(run.dt_s[at], run.u[at], derivatives)
 
 
 def cost(problem: Problem, structure: Structure, x: Array) -> float:

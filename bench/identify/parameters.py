@@ -12,7 +12,7 @@ from .problem import Problem
 from .result import Parameter
 from .uncertainty import Spread
 
-DOUBTFUL = 0.5  # a standard error beyond this share of the value: the data do not tell it
+DOUBTFUL = 0.6  # a standard error beyond this share of the value: the data do not tell it
 
 
 def named(problem: Problem, estimate: Estimate, x: Array) -> list[tuple[str, float, str]]:
@@ -38,7 +38,8 @@ def parameters(problem: Problem, estimate: Estimate, spread: Spread) -> tuple[di
         up, down = named(problem, estimate, x + step), named(problem, estimate, x - step)
         gradient[:, j] = [(a[1] - b[1]) / (2 * h) for a, b in zip(up, down, strict=True)]
     covariance = gradient @ spread.covariance @ gradient.T
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    variance = np.diag(covariance)  # below 0: rounding, where nothing is told
+    std = np.sqrt(np.where(variance < 0, np.nan, variance))
     lost = _lost(estimate)
     result, undetermined = {}, []
     for (name, value, unit), error in zip(entries, std, strict=True):
@@ -55,10 +56,10 @@ def _lost(estimate: Estimate) -> set[str]:
     """Numbers that ended at a bound: the data pull them out of what they can tell."""
     structure, x = estimate.structure, estimate.x
     lower, upper = estimate.bounds.of(structure)
-    k, r = structure.family.size, structure.order
+    k, r = structure.shape_size, structure.order
     out: set[str] = set()
     if x[k + r :].sum() <= NOTHING:
-        return {name for name, _, _ in structure.family.physical_numbers(x[:k], 1.0, 1.0)} | {
+        return {name for name, _, _ in structure.family.physical_numbers(x[: structure.family.size], 1.0, 1.0)} | {
             f"{letter}_{i}" for letter in ("c", "nu") for i in range(1, r + 1)
         }
     for i in range(1, r + 1):
@@ -66,6 +67,7 @@ def _lost(estimate: Estimate) -> set[str]:
             out |= {f"c_{i}", f"nu_{i}"}
         if not lower[k + i - 1] < x[k + i - 1] < upper[k + i - 1]:
             out.add(f"nu_{i}")
+    k = structure.family.size
     if k and not np.all((lower[:k] < x[:k]) & (x[:k] < upper[:k])):
         out |= {"exponential": {"m", "b"}, "power": {"p", "q"}}.get(structure.family.name, set())
     return out

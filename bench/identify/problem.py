@@ -9,39 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import InputError
+from bench.motion_between import motion_between
 from bench.recording.types import Measurement
 from sim.pad import union
 
 from ._kernel import Array
+from .long import is_long, shortened
+from .motion import jitter
+from .runs import Run
 
-CHUNK = 32768  # samples whose derivatives are in memory at once
+__all__ = ["Problem", "Run", "build"]
 
-
-@dataclass(frozen=True)
-class Run:
-    """One measurement on its union grid; all arrays (n,).
-
-    `dt_s`: time since the sample before, 0 for the first; `u`: depth over D; `y`: force over the force scale, 0
-    where `weight` is 0; `weight`: what a sample counts in the cost (0: no force there, or history).
-    """
-
-    time_s: Array
-    dt_s: Array
-    u: Array
-    y: Array
-    weight: Array
-    surface: int | None = None
-    """Which of the problem's doubtful surfaces this run presses; None: its surface is certain."""
-
-    @property
-    def size(self) -> int:
-        """Samples of the union grid."""
-        return len(self.dt_s)
-
-    def chunks(self) -> Iterator[slice]:
-        """Pieces small enough to hold their derivatives."""
-        for start in range(0, self.size, CHUNK):
-            yield slice(start, min(start + CHUNK, self.size))
+PIECE = 1 << 17  # samples looked at at once
 
 
 @dataclass(frozen=True)
@@ -53,17 +32,31 @@ class Problem:
     force_N: float
     measurements: tuple[Measurement, ...] = ()
     where: tuple[NDArray[np.intp], ...] = ()
-    """Of each run: where its force samples stand in the union grid."""
+    """Of each run: where its force samples stand in the union grid; empty for a long run in blocks (`long`)."""
     notes: tuple[str, ...] = field(default=())
     prior: tuple[float, ...] = ()
     """Of each doubtful surface: what its shift squared (units of D) costs, in the units of Σ w e²."""
     noise_square: float = 0.0
     """Variance of the force's noise, scaled; the prior was weighed by it."""
+    rebuilt: bool = False
+    """Whether there are nodes between samples (`bench.motion_between`)."""
+    scatter: float = 0.0
+    """Σ w e² within the blocks of long runs, whatever the model."""
 
     @property
     def weight(self) -> float:
         """Samples that count."""
         return float(sum(run.weight.sum() for run in self.runs))
+
+    @property
+    def pasts(self) -> int:
+        """Runs that begin loaded."""
+        return sum(run.past is not None for run in self.runs)
+
+    @property
+    def rows(self) -> int:
+        """Samples, or blocks, that count."""
+        return int(sum(np.count_nonzero(run.weight) for run in self.runs))
 
     @property
     def size(self) -> int:
@@ -86,9 +79,10 @@ class Problem:
         return float(np.quantile(np.concatenate(steps), 0.1)), float(max(spans))
 
 
-def build(measurements: Sequence[Measurement]) -> Problem:
+def build(measurements: Sequence[Measurement], between: bool = False, blocks: bool = False) -> Problem:
     """Union grids and scales of the measurements.
 
+    `between`: with nodes where the motion between samples matters; `blocks`: very long runs as block means.
     Raises InputError, naming the measurement, where there is nothing to fit: fewer than 20 force samples that count,
     no sample deeper than the surface, no force at all, numbers that are not finite, times that do not increase.
     """
@@ -97,32 +91,55 @@ def build(measurements: Sequence[Measurement]) -> Problem:
     notes: list[str] = []
     checked = [_checked(m, notes) for m in measurements]
     depth = max(float(m.position_mm.max()) for m in checked)
-    force = max(float(np.abs(m.force_N[_counted(m)]).max()) for m in checked)
+    force = max(_largest(m) for m in checked)
     names = ", ".join(m.name for m in checked)
     if depth <= 0:
         raise InputError(names, "the position never passes the surface (0 mm), so there is no contact to fit",
                          "Is the sign of the position right, and its zero at the surface?")  # fmt: skip
     if force <= 0:
         raise InputError(names, "the force is zero throughout", "Is the force channel connected, its column right?")
-    runs, where = [], []
+    runs: list[Run] = []
+    where: list[NDArray[np.intp]] = []
+    more, scatter = 0, 0.0
     for m in checked:
-        run, at = _run(m, depth, force)
+        if blocks and is_long(m):
+            run, lost = shortened(m, depth, force)
+            at, scatter = np.zeros(0, dtype=np.intp), scatter + lost
+        else:
+            run, at, nodes = _run(m, depth, force, between)
+            more += nodes
         runs.append(run)
         where.append(at)
-    return Problem(tuple(runs), depth, force, tuple(checked), tuple(where), tuple(notes))
+    return Problem(
+        tuple(runs), depth, force, tuple(checked), tuple(where), tuple(notes), rebuilt=more > 0, scatter=scatter
+    )
 
 
 def _counted(m: Measurement) -> NDArray[np.bool_]:
-    return (m.force_time_s >= m.fit_from_s) & (m.force_time_s <= m.fit_to_s)
+    return m.counted()
+
+
+def _pieces(values: Array) -> Iterator[Array]:
+    """A piece at a time, each with the first value of the next: what is asked of long data needs no copy of them."""
+    for start in range(0, len(values), PIECE):
+        yield values[start : start + PIECE + 1]
+
+
+def _largest(m: Measurement) -> float:
+    counted = _counted(m)
+    return max(
+        float(np.max(np.abs(m.force_N[k : k + PIECE]), initial=0.0, where=counted[k : k + PIECE]))
+        for k in range(0, len(counted), PIECE)
+    )
 
 
 def _checked(m: Measurement, notes: list[str]) -> Measurement:
     arrays = (m.position_time_s, m.position_mm, m.force_time_s, m.force_N)
     if any(a.ndim != 1 or len(a) == 0 for a in arrays):
         raise InputError(m.name, "there are no samples to fit")
-    if not all(np.isfinite(a).all() for a in arrays):
+    if not all(np.isfinite(piece).all() for a in arrays for piece in _pieces(a)):
         raise InputError(m.name, "there are numbers that are not finite among the samples")
-    if np.any(np.diff(m.position_time_s) <= 0) or np.any(np.diff(m.force_time_s) <= 0):
+    if any(np.any(np.diff(piece) <= 0) for t in (m.position_time_s, m.force_time_s) for piece in _pieces(t)):
         raise InputError(m.name, "times do not increase from sample to sample")
     inside = (m.force_time_s >= m.position_time_s[0]) & (m.force_time_s <= m.position_time_s[-1])
     if not inside.all():
@@ -135,14 +152,18 @@ def _checked(m: Measurement, notes: list[str]) -> Measurement:
     return m
 
 
-def _run(m: Measurement, depth_mm: float, force_N: float) -> tuple[Run, NDArray[np.intp]]:
-    if np.array_equal(m.position_time_s, m.force_time_s):
-        time, position = m.position_time_s, m.position_mm
+def _run(m: Measurement, depth_mm: float, force_N: float, between: bool) -> tuple[Run, NDArray[np.intp], int]:
+    motion_s, motion_mm = m.position_time_s, m.position_mm
+    if between:
+        motion_s, motion_mm = motion_between(motion_s, motion_mm, noise_mm=jitter(motion_mm))
+    if np.array_equal(motion_s, m.force_time_s):
+        time, position = motion_s, motion_mm
         at = np.arange(len(time))
     else:
-        time, at = union(m.position_time_s, m.force_time_s)
-        position = np.interp(time, m.position_time_s, m.position_mm)
+        time, at = union(motion_s, m.force_time_s)
+        position = np.interp(time, motion_s, motion_mm)
     y, weight = np.zeros(len(time)), np.zeros(len(time))
     y[at] = m.force_N / force_N
     weight[at[_counted(m)]] = 1.0
-    return Run(time, np.diff(time, prepend=time[0]), position / depth_mm, y, weight), at
+    run = Run(time, np.diff(time, prepend=time[0]), position / depth_mm, y, weight)
+    return run, at, len(motion_s) - len(m.position_time_s)

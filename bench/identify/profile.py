@@ -1,11 +1,14 @@
-"""Whether the data tell a mode's share and rate: the cost with the number held elsewhere, the rest refitted.
+"""Whether the data tell a mode's share and rate, judged not at the estimate alone.
 
-A standard error speaks of the neighbourhood of the estimate. Where two modes can stand in for each other the valley
-of the cost bends, and a small standard error at one place says nothing: so the number is moved by half its value,
-and everything else may follow.
+A standard error speaks of the neighbourhood of the estimate. Where two modes can stand in for each other, or one is
+hardly needed, the valley of the cost bends, and a small standard error at one place says nothing. So numbers that are
+told weakly are moved far off, and everything else may follow. Where that costs next to nothing the pad may as well be
+there, and the standard errors of that place count too.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -14,37 +17,63 @@ from ._kernel import Array
 from .condense import condensed
 from .estimate import Estimate, polish
 from .problem import Problem
-from .solver import minimise
+from .solver import Solution, minimise
 
-CERTAIN = 0.08  # relative standard error below which, for every mode, nothing bends
-FURTHER = (0.5, 1.5)  # of the value
-LOST = 0.5  # relative standard error that says so by itself
+CERTAIN = 0.2  # relative standard error below which a number is moved nowhere
+DOUBTFUL = 1.0  # relative standard error at another place that says a number is not told
+AS_GOOD = 2.0  # units of χ² that another place may cost
+SHARES = (0.5, 1.5, 2.5)  # where a share is tried, of its value
+RATES = (0.4, 2.5)
+SAMPLES = 1000  # that are enough to see it
 
 
 def not_told(problem: Problem, estimate: Estimate, relative_std: dict[str, float], independent: float) -> set[str]:
-    """Names of c_i and nu_i that can be half as large again, or half as large, for less than one unit of χ².
+    """Names of c_i and nu_i whose standard error is beyond their value at a place that explains the data as well.
 
-    `relative_std`: of c_i, nu_i by name; `independent`: how many samples the residual is worth. χ² counts those.
+    `relative_std`: of c_i, nu_i by name, nan where there is none; `independent`: how many samples the residual is
+    worth. χ² counts those.
     """
-    if all(value < CERTAIN for value in relative_std.values()):
+    weak = [name for name, value in relative_std.items() if not value < CERTAIN]
+    if not weak:
         return set()
-    short, _ = condensed(problem)
-    best = polish(short, estimate, tolerance=1e-9)
+    short, _ = condensed(problem, SAMPLES)
+    best = polish(short, estimate, tolerance=1e-8)
     unit = estimate.cost / max(independent, 1.0)  # of the cost, for one unit of χ²
-    out = set()
-    for i in range(1, estimate.structure.order + 1):
-        for name in (f"c_{i}", f"nu_{i}"):
-            if relative_std.get(name, np.inf) > LOST:
-                continue  # known to be lost already
-            if any(_cost_at(short, best, name, i, factor) - best.cost < unit for factor in FURTHER):
-                out.add(name)
+    out: set[str] = set()
+    for name in weak:
+        i = int(name.partition("_")[2])
+        for factor in RATES if name.startswith("nu") else SHARES:
+            if len(out) == len(relative_std):
+                return out
+            for found in _moved(short, best, name, i, factor, unit):
+                errors = _relative(best, found, unit)
+                out |= {other for other, error in errors.items() if error > DOUBTFUL}
     return out
 
 
-def _cost_at(problem: Problem, best: Estimate, name: str, i: int, factor: float) -> float:
-    """The least cost with the number held at `factor` times its value."""
+def _relative(best: Estimate, found: Solution, unit: float) -> dict[str, float]:
+    """Relative standard errors of shares and rates at another place, the modes named by their rates there."""
+    k, r = best.structure.shape_size, best.structure.order
+    diagonal = np.diag(found.matrix)
+    scale = np.sqrt(np.maximum(diagonal, 1e-12 * diagonal.max()))
+    values, vectors = np.linalg.eigh(found.matrix / np.outer(scale, scale))
+    inverse = (vectors / np.maximum(values, 1e-9)) @ vectors.T / np.outer(scale, scale) * unit
+    weights = found.x[k + r :]
+    gain = max(float(weights.sum()), 1e-300)
+    out = {}
+    for rank, i in enumerate(np.argsort(-found.x[k : k + r], kind="stable"), 1):
+        share = max(float(weights[i + 1]) / gain, 1e-6)
+        gradient = np.full(r + 1, -share / gain)
+        gradient[i + 1] += 1 / gain
+        out[f"c_{rank}"] = math.sqrt(max(gradient @ inverse[k + r :, k + r :] @ gradient, 0.0)) / share
+        out[f"nu_{rank}"] = math.sqrt(max(float(inverse[k + i, k + i]), 0.0))
+    return out
+
+
+def _moved(problem: Problem, best: Estimate, name: str, i: int, factor: float, unit: float) -> list[Solution]:
+    """Places with the number at `factor` times its value that cost next to nothing; their matrix is the cost's own."""
     structure, x = best.structure, best.x
-    k, r = structure.family.size, structure.order
+    k, r = structure.shape_size, structure.order
     lower, upper = best.bounds.of(structure)
     row = np.zeros(len(x))
     starts = [x.copy(), *_split(best, i, factor)]
@@ -69,22 +98,26 @@ def _cost_at(problem: Problem, best: Estimate, name: str, i: int, factor: float)
     def cost(v: Array) -> float:
         return objective.cost(problem, structure, v) + float(row @ v) ** 2
 
-    tolerance = 1e-4 / max(problem.weight, 1.0)
-    return min(minimise(normal, cost, start, lower, upper, 40, tolerance).cost for start in starts)
+    tolerance = 0.02 * unit / max(best.cost, 1e-300)
+    found = []
+    for start in starts:
+        s = minimise(normal, cost, start, lower, upper, 15, tolerance)
+        if s.cost < best.cost + AS_GOOD * unit:
+            found.append(Solution(s.x, s.cost, s.matrix - np.outer(row, row), s.steps, s.converged))
+    return found
 
 
 def _split(best: Estimate, i: int, factor: float) -> list[Array]:
     """The mode's neighbour takes half of it and stands as far on the other side: what two near modes do."""
-    k, r = best.structure.family.size, best.structure.order
+    k, r = best.structure.shape_size, best.structure.order
     out = []
     for j in range(1, r + 1):
         if j == i:
             continue
         start = best.x.copy()
         middle, share = start[k + i - 1], start[k + r + i]
-        for side in (np.log(factor), -np.log(factor)):
-            other = start.copy()
-            other[k + i - 1], other[k + j - 1] = middle + side, middle - side
-            other[k + r + i], other[k + r + j] = share / 2, share / 2 + start[k + r + j]
-            out.append(other)
+        side = abs(np.log(min(max(factor, 0.4), 2.5))) * (1 if i < j else -1)
+        start[k + i - 1], start[k + j - 1] = middle + side, middle - side
+        start[k + r + i], start[k + r + j] = share / 2, share / 2 + start[k + r + j]
+        out.append(start)
     return out

@@ -89,18 +89,18 @@ def choose(
     lowest = min(candidates, key=lambda c: c.V)
     refined = polish(problem, lowest.estimate, max_steps=10)
     independent = independent_samples(problem, refined.x, refined.structure)
-    candidates = [_judged(c, independent) for c in candidates]
+    candidates = [judged(c, independent) for c in candidates]
     ranked = sorted(candidates, key=lambda c: (not c.eligible, c.criterion))
-    judged = []
+    finished = []
     for rank, c in enumerate(ranked):
         progress(f"comparing {c.estimate.structure.family.name}, order {c.estimate.structure.order}")
-        judged.append(_finished(c, problem, short, owners, independent, contender=rank < CONTENDERS))
-    best = _pick(judged)
-    if all(best is not c for c in judged[:CONTENDERS]):
+        finished.append(_finished(c, problem, short, owners, independent, contender=rank < CONTENDERS))
+    best = _pick(finished)
+    if all(best is not c for c in finished[:CONTENDERS]):
         better = _finished(best, problem, short, owners, independent, contender=True)
-        judged = [better if c is best else c for c in judged]
+        finished = [better if c is best else c for c in finished]
         best = better
-    return Choice(best, judged, independent)
+    return Choice(best, finished, independent)
 
 
 def _finished(
@@ -115,10 +115,10 @@ def _finished(
     if contender:
         e = polish(problem, c.estimate)
         held = held_out_square(short, problem, owners, e)
-        return _judged(Candidate(e, e.cost / problem.weight, held), independent)
+        return judged(Candidate(e, e.cost / problem.weight, held), independent)
     V = objective.cost(problem, c.estimate.structure, c.estimate.x) / problem.weight
     held = held_out_square(short, problem, owners, c.estimate, max_steps=5) if problem.size <= LONG else float("nan")
-    return _judged(Candidate(c.estimate, V, held), independent)
+    return judged(Candidate(c.estimate, V, held), independent)
 
 
 class Ladder:
@@ -138,7 +138,7 @@ class Ladder:
             starts = self._starter.first(r)
             if self.found:
                 starts += self._starter.next(self.found[-1].structure, self.found[-1].x)
-            self.found.append(search(self.problem, Structure(self.family, r, self.unilateral), starts, self.bounds))
+            self.found.append(search(self.problem, Structure(self.family, r, self.unilateral, self.problem.pasts), starts, self.bounds))
 
     def _idle(self) -> bool:
         if len(self.found) < 2:
@@ -163,7 +163,8 @@ def _lets_go(problem: Problem, ladders: list[Ladder]) -> bool:
     )
 
 
-def _judged(c: Candidate, independent: float) -> Candidate:
+def judged(c: Candidate, independent: float) -> Candidate:
+    """The candidate with its criterion, for residuals worth so many independent samples."""
     V = c.V + RESOLVED**2  # the scaled force is 1 at most
     return replace(c, criterion=independent * float(np.log(V)) + c.size * float(np.log(independent)))
 

@@ -40,7 +40,7 @@ def minimise(
     damping, grow = 1e-3, 2.0
     value, g, H = normal(x)
     floor = 1e-30 * max(value, 1.0)
-    idle = 0
+    idle = step = 0
     for step in range(1, max_steps + 1):
         free = ~(((x <= lower) & (g < 0)) | ((x >= upper) & (g > 0)))
         scale = np.sqrt(np.maximum(np.diag(H), 1e-14 * np.max(np.diag(H)) + 1e-300))
@@ -69,7 +69,7 @@ def minimise(
         damping = max(damping * max(1 / 5, 1 - (2 * ratio - 1) ** 3), 1e-15)
         grow = 2.0
         value, g, H = normal(x)
-    return Solution(x, value, H, max_steps, False)
+    return Solution(x, value, H, step, False)
 
 
 def _step(H: Array, g: Array, scale: Array, free: np.ndarray, damping: float) -> Array:

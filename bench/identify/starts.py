@@ -18,6 +18,7 @@ from .objective import Structure
 from .problem import Problem
 
 GRID = 13  # rates on the grid
+PAST = 4.0  # of F^e at the greatest depth: more than that no mode has left from before
 
 
 @dataclass(frozen=True)
@@ -35,15 +36,16 @@ class Bounds:
     def of(self, structure: Structure) -> tuple[Array, Array]:
         """Lower and upper bounds of x."""
         family, r = structure.family, structure.order
-        lower = np.concatenate([family.lower, np.full(r, np.log(self.slowest)), np.zeros(r + 1)])
-        upper = np.concatenate([family.upper, np.full(r, np.log(self.fastest)), np.full(r + 1, np.inf)])
+        past = np.full(structure.pasts * r, PAST)
+        lower = np.concatenate([family.lower, -past, np.full(r, np.log(self.slowest)), np.zeros(r + 1)])
+        upper = np.concatenate([family.upper, past, np.full(r, np.log(self.fastest)), np.full(r + 1, np.inf)])
         return lower, upper
 
 
 def bounds_of(problem: Problem) -> Bounds:
-    """From a third of a time constant in the longest run to half a time constant a sample."""
+    """From a third of a time constant in the longest run to one time constant a sample."""
     step, span = problem.times()
-    return Bounds(slowest=0.3 / span, fastest=max(0.5 / step, 10.0 / span))
+    return Bounds(slowest=0.3 / span, fastest=max(1.0 / step, 10.0 / span))
 
 
 @dataclass(frozen=True)
@@ -92,9 +94,17 @@ def gram(problem: Problem, family: Family, theta: Array, rates: Array, elastic: 
         weight = keep[j] if keep is not None else run.weight
         H = _kernel.modes(run.dt_s, s, rates)
         weighted = H * weight[:, None]
-        matrix += H.T @ weighted
-        right += weighted.T @ run.y
-        square += float(np.dot(weight * run.y, run.y))
+        products, ends, own = H.T @ weighted, weighted.T @ run.y, float(np.dot(weight * run.y, run.y))
+        if run.past is not None:
+            # Whatever the rates turn out to be, the past fades within what the whole grid of rates can follow.
+            E = np.exp(-rates * (run.time_s - run.time_s[0])[:, None])
+            half = (E * weight[:, None]).T
+            inverse, shared, seen = np.linalg.pinv(half @ E, rcond=1e-7, hermitian=True), half @ H, half @ run.y
+            products, ends = products - shared.T @ inverse @ shared, ends - shared.T @ inverse @ seen
+            own -= float(seen @ inverse @ seen)
+        matrix += products
+        right += ends
+        square += own
     return Gram(theta, rates, matrix, right, square)
 
 
@@ -150,10 +160,25 @@ class Starter:
         if not best:  # a mode that the data give no share: in the widest gap
             gaps = np.min(np.abs(np.log(new[:, None] / rates)), axis=1)
             spare = np.concatenate([[np.log(new[np.argmax(gaps)])], [1e-3 * x[-structure.order - 1 :].sum()]])
-            return [np.concatenate([theta, np.log(rates), spare[:1], x[-structure.order - 1 :], spare[1:]])]
+            more = np.concatenate([theta, np.log(rates), spare[:1], x[-structure.order - 1 :], spare[1:]])
+            return [self._with_past(more, structure.order + 1)]
         return [self._x(g, columns, a) for _, columns, a in best]
 
     def _x(self, g: Gram, columns: list[int], a: Array) -> Array:
         rates = g.rates[np.array(columns) - 1]
         weights = np.maximum(a, 1e-3 * np.sum(a))  # off the bound, where a rate would have no gradient
-        return np.concatenate([g.theta, np.log(rates), weights])
+        return self._with_past(np.concatenate([g.theta, np.log(rates), weights]), len(rates))
+
+    def _with_past(self, x: Array, order: int) -> Array:
+        """The start with the pasts that suit it best: they are linear, so one step finds them."""
+        if not self.problem.pasts:
+            return x
+        structure = Structure(self.family, order, self.unilateral, self.problem.pasts)
+        k = self.family.size
+        out = np.concatenate([x[:k], np.zeros(structure.shape_size - k), x[k:]])
+        _, gradient, matrix = objective.normal_equations(self.problem, structure, out)
+        inside = slice(k, structure.shape_size)
+        H = matrix[inside, inside]
+        H = H + 1e-9 * max(float(np.trace(H)), 1e-30) * np.eye(len(H))
+        out[inside] = np.clip(np.linalg.solve(H, gradient[inside]), -PAST / 2, PAST / 2)
+        return out

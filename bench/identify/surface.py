@@ -8,11 +8,12 @@ with that standard deviation; positions whose surface is certain (CSV) are taken
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ._kernel import Array
-from .laws import Family
+from .laws import Family, Named
 from .problem import Problem, Run
 
 FARTHEST = 6.0  # standard deviations that a surface may be moved
@@ -63,6 +64,11 @@ class Movable(Family):
 
     surfaces: int = 0
     law: Family | None = None
+
+    def entry(self, numbers: Named) -> dict[str, Any]:
+        """The law's own."""
+        assert self.law is not None
+        return self.law.entry(numbers)
 
     def of_run(self, u: Array, theta: Array, surface: int | None, slopes: bool = True) -> tuple[Array, Array]:
         """As `Family.of_run`; the derivative by the run's own surface is the stiffness."""

@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from . import objective
 from ._kernel import Array
+from .colour import corrected_colour, plain_colour, spread_through
 from .estimate import Estimate
 from .objective import Structure
 from .problem import Problem
 
-MOST = 400_000  # samples kept one by one; beyond, neighbours are summed
+TELLING = 2.0  # standard deviations of its own by which the scores must say more
 
 
 @dataclass(frozen=True)
@@ -24,54 +26,73 @@ class Spread:
 
 
 def spread_of(problem: Problem, estimate: Estimate) -> Spread:
-    """Sandwich H⁻¹ S H⁻¹, H = Σ J Jᵀ, in two forms; of each variable the larger variance counts.
+    """Sandwich H⁻¹ S H⁻¹, H = Σ J Jᵀ, in two forms.
 
+    - S = Σ J_k γ(k−l) J_lᵀ with the noise's autocovariance γ (`colour`): steady, but holds for even noise;
     - S from the scores J e themselves, summed over windows as long as the residual remembers (Bartlett's kernel):
-      holds where the noise grows with depth or the model does not fit, poor where few samples carry a parameter;
-    - S = Σ J_k γ(k−l) J_lᵀ with the residual's autocovariance γ over all the data: steady, but holds for even noise.
-    The prior of a doubtful surface adds its own spread. Variables at a bound have none.
+      holds where the noise grows with depth or the model does not fit, but is uncertain itself. Where it says more
+      than the first by more than its own doubt, it counts.
+    Both are widened by Student's factor for the few samples that the residual may be worth. The prior of a doubtful
+    surface adds its own spread. Variables at a bound have none.
     """
     P = estimate.structure.size
     scores, sensitivity, errors = _per_sample(problem, estimate)
-    total = sum(len(e) for e in errors)
-    gamma, lags = _autocovariance(errors)
     free = _free(estimate)
     inverse = np.zeros((P, P))
     H = estimate.matrix[np.ix_(free, free)]
     inverse[np.ix_(free, free)] = _inverted(H)
+    colour = corrected_colour(errors, sensitivity, inverse)
     believed = np.diag(objective.prior_of(problem, estimate.structure)) * problem.noise_square
-    by_scores = inverse @ (_windowed(scores, 2 * lags) + believed) @ inverse
-    by_colour = inverse @ (_coloured(sensitivity, gamma) + believed) @ inverse
-    independent = total / _memory(gamma)
-    freedom = min(independent / max(independent - free.sum(), 1.0), 3.0)  # what the fit itself took out of the residual
-    widest = np.sqrt(np.maximum(np.maximum(np.diag(by_scores), np.diag(by_colour)), 0.0) * freedom)
+    by_colour = inverse @ (spread_through(sensitivity, colour.gamma) + believed) @ inverse
+    window = int(min(np.ceil(2 * colour.memory), max(len(e) for e in errors)))
+    by_scores = inverse @ (_windowed(scores, window) + believed) @ inverse
+    independent = sum(len(e) for e in errors) / colour.memory
+    freedom = max(independent - float(free.sum()), 1.0)
+    even, uneven = np.diag(by_colour), np.diag(by_scores) * independent / freedom
+    doubt = np.sqrt(2 / _contributions(scores, inverse, window))
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = np.where(np.diag(by_colour) > 0, widest / np.sqrt(np.abs(np.diag(by_colour))), 1.0)
-    covariance = by_colour * np.outer(ratio, ratio)
-    return Spread(covariance, problem.weight / _memory(gamma))
+        ratio = np.where(even > 0, uneven / even, 1.0)
+    ratio = np.where(ratio > 1 + TELLING * doubt, ratio, 1.0)
+    widened = np.sqrt(ratio) * student(freedom)
+    return Spread(by_colour * np.outer(widened, widened), independent)
+
+
+def student(freedom: float) -> float:
+    """What makes ±1.96 standard errors a 95 % interval when the noise itself was estimated."""
+    return float(stdtrit(min(max(freedom, 2.0), 1e6), 0.975) / 1.959964)
 
 
 def independent_samples(problem: Problem, x: Array, structure: Structure) -> float:
     """How many independent samples the residual at x is worth; at least ten."""
     errors = []
     for run, (force, _, _) in zip(problem.runs, objective.forces(problem, structure, x), strict=True):
-        errors.append((run.y - force)[run.weight > 0])
-    gamma, _ = _autocovariance(errors)
-    return max(sum(len(e) for e in errors) / _memory(gamma), 10.0)
+        errors.append((np.sqrt(run.weight) * (run.y - force))[run.weight > 0])
+    return max(sum(len(e) for e in errors) / plain_colour(errors).memory, 10.0)
 
 
-def _memory(gamma: Array) -> float:
-    """1 + 2 Σ ρ: how many samples in a row say the same."""
-    return max(1 + 2 * float(np.sum(gamma[1:] / gamma[0])), 1.0) if gamma[0] > 0 else 1.0
+def _contributions(scores: list[Array], inverse: Array, window: int) -> Array:
+    """How many independent stretches of the data carry each variable, (P,): (Σ q)²/Σ q² of their squares."""
+    first, second = np.zeros(inverse.shape[0]), np.zeros(inverse.shape[0])
+    for g in scores:
+        if len(g):
+            pulls = np.add.reduceat(g, np.arange(0, len(g), max(window, 1)), axis=0) @ inverse
+            first += np.sum(pulls**2, axis=0)
+            second += np.sum(pulls**4, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.maximum(np.where(second > 0, first**2 / second, 1.0), 1.0)
 
 
 def _free(estimate: Estimate) -> np.ndarray:
     lower, upper = estimate.bounds.of(estimate.structure)
     x = estimate.x
-    k, r = estimate.structure.family.size, estimate.structure.order
+    k, r = estimate.structure.shape_size, estimate.structure.order
     free = (x > lower) & (x < upper)
+    free[k + r] = True  # c_0 at 0 is a share like others: what it might be is part of their doubt
     for i in range(r):  # a mode without a share has no rate
-        free[k + i] &= bool(x[k + r + 1 + i] > 0)
+        shared = bool(x[k + r + 1 + i] > 0)
+        free[k + i] &= shared
+        for j in range(estimate.structure.pasts):
+            free[estimate.structure.past(j).start + i] &= shared
     return free
 
 
@@ -79,54 +100,29 @@ def _inverted(H: Array) -> Array:
     scale = np.sqrt(np.diag(H))
     scale[scale == 0] = 1.0
     values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
-    values = np.maximum(values, 1e-13 * max(values.max(initial=0.0), 1e-300))
+    values = np.maximum(values, 1e-10 * max(values.max(initial=0.0), 1e-300))
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
 
 
 def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list[Array], list[Array]]:
     """Of each run, over the samples that count: scores e J, J, e.
 
-    In long data each row stands for m neighbours: Σ e J, Σ J/√m, Σ e/√m.
+    A block of w samples counts as one: e √w, J √w.
     """
     structure, x = estimate.structure, estimate.x
-    m = max(1, int(np.ceil(problem.weight / MOST)))
     scores, sensitivities, errors = [], [], []
     for run in problem.runs:
-        score_parts, J_parts, e_parts = [], [], []
+        J_parts, e_parts = [], []
         for piece in objective.simulate(run, structure, x, derivatives=True):
-            counts = run.weight[piece.at] > 0
-            J = piece.jacobian[counts]
-            e = run.y[piece.at][counts] - piece.force[counts]
-            score_parts.append(_summed(J * e[:, None], m))
-            J_parts.append(_summed(J, m) / np.sqrt(m))
-            e_parts.append(_summed(e[:, None], m)[:, 0] / np.sqrt(m))
-        scores.append(np.concatenate(score_parts))
+            weight = run.weight[piece.at]
+            counts = weight > 0
+            root = np.sqrt(weight[counts])
+            J_parts.append(piece.jacobian[counts] * root[:, None])
+            e_parts.append((run.y[piece.at][counts] - piece.force[counts]) * root)
         sensitivities.append(np.concatenate(J_parts))
         errors.append(np.concatenate(e_parts))
+        scores.append(sensitivities[-1] * errors[-1][:, None])
     return scores, sensitivities, errors
-
-
-def _summed(rows: Array, m: int) -> Array:
-    return rows if m == 1 or len(rows) == 0 else np.add.reduceat(rows, np.arange(0, len(rows), m), axis=0)
-
-
-def _autocovariance(errors: list[Array]) -> tuple[Array, int]:
-    """γ(0) … γ(L) of the residual, up to where it has died away (2 %, or its own error), L+1."""
-    longest = max(len(e) for e in errors)
-    total = sum(len(e) for e in errors)
-    most = max(longest // 4, 1)
-    gamma = np.zeros(most)
-    for e in errors:
-        size = 1 << int(np.ceil(np.log2(2 * len(e))))
-        power = np.abs(np.fft.rfft(e, size)) ** 2
-        raw = np.fft.irfft(power, size)[: min(most, len(e))]
-        gamma[: len(raw)] += raw
-    gamma /= total
-    if gamma[0] <= 0:
-        return gamma[:1], 1
-    small = np.flatnonzero(gamma / gamma[0] < max(0.02, 1.5 / np.sqrt(total)))
-    last = int(small[0]) if len(small) else most
-    return gamma[: max(last, 1)], max(last, 1)
 
 
 def _windowed(scores: list[Array], width: int) -> Array:
@@ -143,26 +139,4 @@ def _windowed(scores: list[Array], width: int) -> Array:
         begins = np.maximum(np.arange(1 - width, n), 0)
         windows = padded[ends] - padded[begins]
         out += windows.T @ windows / width
-    return out
-
-
-def _coloured(sensitivity: list[Array], gamma: Array) -> Array:
-    """Σ_kl γ(k−l) J_k J_lᵀ, by Fourier transform (the kernel tapered to stay non-negative)."""
-    P = sensitivity[0].shape[1]
-    out = np.zeros((P, P))
-    L = len(gamma)
-    for J in sensitivity:
-        if L == 1:
-            out += gamma[0] * (J.T @ J)
-            continue
-        n = len(J)
-        size = 1 << int(np.ceil(np.log2(n + L)))
-        kernel = np.zeros(size)
-        kernel[:L] = gamma
-        kernel[-(L - 1) :] = gamma[:0:-1]
-        spectrum = np.maximum(np.fft.rfft(kernel).real, 0.0)
-        fold = np.full(len(spectrum), 2.0)
-        fold[0] = fold[-1] = 1.0
-        transformed = np.fft.rfft(J, size, axis=0)
-        out += np.real((transformed.conj() * (fold * spectrum)[:, None]).T @ transformed) / size
     return out

@@ -1,7 +1,8 @@
 """From a recording to the arrays that a fit may see: the rules, in one place.
 
 What was measured is not changed: positions move into the pad frame, stamps by the delays that `doctor` measured, and
-samples that cannot count are left out and named.
+samples that cannot count are left out and named. Where polls are too slow to show a move, its commanded profile stands
+between them (`between`), and what is not known of it costs nothing in a fit.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from bench import yamlfile
 from bench.errors import InputError
+from bench.recording.between import between_polls
 from bench.recording.schemas import BENCH_FILE, NO_SURFACE, STOPPED
 from bench.recording.types import Array, Measurement, Recording
 
@@ -86,6 +88,13 @@ def measurement_of(recording: Recording) -> Measurement:
     _report_gaps("force", force_time, notes)
     _report_spikes("position", position_time, position, notes)
     _report_spikes("force", force_time, force, notes)
+    doubtful: list[tuple[float, float]] = []
+    stamp_std = 0.0
+    between = between_polls(recording.events, position_time, position, force_time, force)
+    if between is not None:
+        position_time, position, doubtful = between.time_s, between.position_mm, between.doubtful
+        stamp_std = between.stamp_std_s
+        notes += between.notes
     return Measurement(
         name=_name(recording.source),
         position_time_s=position_time,
@@ -97,6 +106,8 @@ def measurement_of(recording: Recording) -> Measurement:
         marks=list(recording.steps),
         surface_std_mm=recording.surface_std_mm,
         notes=notes,
+        doubtful=doubtful,
+        stamp_std_s=stamp_std,
     )
 
 

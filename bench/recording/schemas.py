@@ -36,6 +36,16 @@ NO_SURFACE = "no_surface"
 STOPPED = "stopped"
 """The event after which the motion is no longer the protocol's: the axis goes to its safe state."""
 
+MOVE = "move"
+"""The event of a motor that makes its own moves having taken one: `target_mm` (motor frame), `speed_mm_s`,
+`acceleration_mm_s2` as the device counts them, and `waited_s` since it was commanded, within which the move began."""
+
+HALT = "halt"
+"""The event of such a motor told to stop where it is."""
+
+POLLED = "polled"
+"""The event that says how positions are asked for: `period_s`, and `stamp_std_s`, the doubt of a poll's stamp."""
+
 
 @dataclass(frozen=True)
 class Topic:

@@ -132,3 +132,17 @@ class Measurement:
     surface_std_mm: float = 0.0
     notes: list[str] = field(default_factory=list)
     """What was repaired or left out on reading, in plain words."""
+    doubtful: list[tuple[float, float]] = field(default_factory=list)
+    """Spans of time (first and last force stamp) in which the position is not known well enough for the force to count
+    (`bench.recording.between`); the motion in them counts as history."""
+
+    stamp_std_s: float = 0.0
+    """By how much all stamps of the position may be early or late against those of the force, standard deviation."""
+
+    def counted(self) -> NDArray[np.bool_]:
+        """Which force samples cost something, (m,): from `fit_from_s` to `fit_to_s`, and none that is doubtful."""
+        counted = (self.force_time_s >= self.fit_from_s) & (self.force_time_s <= self.fit_to_s)
+        for begin_s, end_s in self.doubtful:
+            first = np.searchsorted(self.force_time_s, begin_s)
+            counted[first : np.searchsorted(self.force_time_s, end_s, side="right")] = False
+        return counted

@@ -7,13 +7,16 @@ profile over, and which samples have come.
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from bench.recording.schemas import HALT, MOVE
 from drivers.errors import DriverError
 from drivers.motor import Motor, MotorSample
+from drivers.registers import RegisterMotor
 from drivers.wire import Exchange, Pause, Steps
 
 
@@ -112,6 +115,9 @@ class Axis:
         self._item: Exchange[Any] | Pause | None = None
         self._pause_until_s = 0.0
         self.failures: list[DriverError] = []
+        self.told: list[tuple[float, str, dict[str, float]]] = []
+        """Moves that a move motor has taken, and halts: time, name, numbers; for whoever records."""
+        self._telling: tuple[float, dict[str, float]] | None = None
         self.refused: DriverError | None = None
         """Why the motor did not take a move or a stop; the plan goes on without it, so the run must not."""
 
@@ -151,7 +157,15 @@ class Axis:
         self._curve = curve
         self._start_s = self.clock.now()
         if self.motor.kind == "move":
+            self._telling = (self._start_s, self._as_written(curve.end_mm, speed_mm_s, acceleration_mm_s2))
             self._begin(self.motor.move(curve.end_mm, speed_mm_s, acceleration_mm_s2))
+
+    def stamp_std_s(self) -> float:
+        """Doubt of the polls' stamps: a device looks where it is at some time while it works on its reply, and always
+        at the same; stamps are in the middle, so that half of that time is not too much for a standard deviation."""
+        if isinstance(self.motor, RegisterMotor):
+            return 0.5e-3 * self.motor.map.reply.processing_ms
+        return 0.0
 
     def halt(self, deceleration_mm_s2: float) -> None:
         """Decelerate from the present commanded motion and stand."""
@@ -161,6 +175,8 @@ class Axis:
         self._curve = Braking(here, velocity, deceleration_mm_s2) if velocity else Rest(here)
         self._start_s = now
         if self.motor.kind == "move":
+            self._note_taken(now)
+            self.told.append((now, HALT, {}))
             self.clear_queue()
             self._begin(self.motor.stop())
         else:
@@ -241,6 +257,21 @@ class Axis:
             due = min(due, self._pause_until_s)
         return due
 
+    def _as_written(self, target_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> dict[str, float]:
+        """The move in the device's own counts, where it has such; what it refuses is told by the move itself."""
+        move = target_mm, speed_mm_s, acceleration_mm_s2
+        if isinstance(self.motor, RegisterMotor):
+            with contextlib.suppress(DriverError):
+                move = self.motor.as_written(*move)
+        return dict(zip(("target_mm", "speed_mm_s", "acceleration_mm_s2"), move, strict=True))
+
+    def _note_taken(self, now_s: float) -> None:
+        """The move under way began between its command and now."""
+        if self._telling is not None:
+            commanded_s, move = self._telling
+            self.told.append((now_s, MOVE, {**move, "waited_s": now_s - commanded_s}))
+            self._telling = None
+
     def _begin(self, steps: Steps[Any]) -> None:
         self._steps = steps
         self._item = None
@@ -264,10 +295,12 @@ class Axis:
         except StopIteration:
             self._steps = None
             self._item = None
+            self._note_taken(now_s)
             return
         except DriverError as failure:
             self._steps = None
             self._item = None
+            self._telling = None
             self.refused = failure
             return
         self._item = item

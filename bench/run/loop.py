@@ -212,6 +212,8 @@ class Loop:
             if window is not None:
                 window.motor_time_s.append(reading.time_s)
                 window.position_mm.append(reading.position_mm)
+        while axis.told:
+            sink.event(*axis.told.pop(0))
         while axis.failures:
             failure = axis.failures.pop(0)
             self._failed += 1

@@ -14,6 +14,7 @@ from bench.config import Bench
 from bench.errors import InputError, Stopped
 from bench.plan import Plan, Segment
 from bench.protocol import Approach, Protocol
+from bench.recording.schemas import POLLED
 from bench.recording.types import StepMark
 from bench.run.approach import tare, touch_off
 from bench.run.force import hold_force, press
@@ -123,6 +124,9 @@ class Run:
         loop.begin_measuring()
         held = yield from loop.perform(motor.prepare(self._clamps()))
         loop.sink.event(self.clock.now(), "clamps", dict(held))
+        if motor.kind == "move":
+            polled = {"period_s": loop.axis.period_s, "stamp_std_s": loop.axis.stamp_std_s()}
+            loop.sink.event(self.clock.now(), POLLED, polled)
         yield from self._await_rest()
         yield from loop.perform(motor.energise())
         yield from self._go_live()

@@ -121,6 +121,7 @@ EFFECT = Effect(
                     "already", "mm", 0.0, 100.0, 1.0, "depth reached before the data begin", starts=(0.5, 1.5, 3.0)
                 ),
             ),
+            sought=False,
             blocks={"elastic": exponential},
             state=(0.0,),
         ),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import pytest
 
 import drivers
 from drivers.clock import WallClock
+from drivers.errors import DriverError
 from drivers.loadcell import LoadCell
 from drivers.motor import Motor
 from drivers.spec import LoadCellSpec, MotorSpec
@@ -87,6 +88,30 @@ def served(name: str) -> Iterator[tuple[str, Clock]]:
         yield child.stdout.readline().strip(), WallClock()
 
 
+TRIES = 6
+"""On the wall clock: a busy machine gives the other process the processor some tens of milliseconds late, now and then
+beyond the deadline of a reply. The contract is then tried anew; whatever fails without a late reply fails at once."""
+
+
+def on_the_wall(
+    serve: Callable[[], AbstractContextManager[tuple[Any, Clock]]],
+    open_device: Callable[[Any, Clock], Any],
+    check: Callable[[Any], None],
+) -> None:
+    """The contract with a device in another process, and a new one of both where the machine was late."""
+    for left in reversed(range(TRIES)):
+        with serve() as (port, clock):
+            device = open_device(port, clock)
+            try:
+                check(device)
+                return
+            except (AssertionError, DriverError):
+                if not left or device.link.traffic.timeouts == 0:
+                    raise
+            finally:
+                device.link.close()
+
+
 def open_motor(name: str, port: str, clock: Clock) -> Motor:
     return drivers.open_motor(MotorSpec(port=port, **MOTORS[name]), clock)
 
@@ -119,30 +144,30 @@ def test_load_cell_over_a_simulated_port(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["orca", "iai"])
 def test_motor_over_a_pseudo_terminal(name: str) -> None:
-    with emulated(name, "dad141") as (ports, clock):
-        motor = open_motor(name, ports["motor"], clock)
-        contract_motor.check_all(motor)
-        motor.link.close()
+    on_the_wall(
+        lambda: emulated(name, "dad141"),
+        lambda ports, clock: open_motor(name, ports["motor"], clock),
+        contract_motor.check_all,
+    )
 
 
 @pytest.mark.parametrize("name", ["dad141", "dad141_modbus"])
 def test_load_cell_over_a_pseudo_terminal_or_socket(name: str) -> None:
-    with emulated("orca", name) as (ports, clock):
-        cell = open_load_cell(name, ports["load_cell"], clock)
-        contract_load_cell.check_all(cell, 0.0, at_least_hz=0.6 * RATES_HZ[name])
-        cell.link.close()
+    on_the_wall(
+        lambda: emulated("orca", name),
+        lambda ports, clock: open_load_cell(name, ports["load_cell"], clock),
+        lambda cell: contract_load_cell.check_all(cell, 0.0, at_least_hz=0.6 * RATES_HZ[name]),
+    )
 
 
 @pytest.mark.parametrize("name", ["orca", "iai"])
 def test_motor_against_pymodbus(name: str) -> None:
-    with served(name) as (port, clock):
-        motor = open_motor(name, port, clock)
-        contract_motor.check_all(motor)
-        motor.link.close()
+    on_the_wall(lambda: served(name), lambda port, clock: open_motor(name, port, clock), contract_motor.check_all)
 
 
 def test_load_cell_against_pymodbus() -> None:
-    with served("dad141_modbus") as (port, clock):
-        cell = open_load_cell("dad141_modbus", port, clock)
-        contract_load_cell.check_all(cell, 1.25, at_least_hz=50.0)
-        cell.link.close()
+    on_the_wall(
+        lambda: served("dad141_modbus"),
+        lambda port, clock: open_load_cell("dad141_modbus", port, clock),
+        lambda cell: contract_load_cell.check_all(cell, 1.25, at_least_hz=50.0),
+    )

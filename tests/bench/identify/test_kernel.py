@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.identify import fit, objective, problem
+from bench.identify import fit, objective, problem, runs
 from bench.identify.laws import exponential, polynomial, power
 from bench.identify.objective import Structure
 from tests.truth.laws import Exponential, Power
@@ -37,7 +37,7 @@ def test_normal_equations_do_not_depend_on_the_chunk(monkeypatch: pytest.MonkeyP
     structure = Structure(exponential(), 2, True)
     x = np.concatenate([[1.5], np.log([5.0, 0.4]), [0.5, 0.3, 0.2]])
     whole = objective.normal_equations(data, structure, x)
-    monkeypatch.setattr(problem, "CHUNK", 77)
+    monkeypatch.setattr(runs, "CHUNK", 77)
     for a, b in zip(whole, objective.normal_equations(data, structure, x), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-11)
 

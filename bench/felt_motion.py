@@ -8,38 +8,43 @@ samples, a trapezoid's pieces are met exactly, and corners keep their place.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.identify.motion import jitter
+from bench.motion_between import motion_between
 from sim.jit import compiled
 
 Array = NDArray[np.float64]
 
-REACHES = np.array([2, 3, 4, 6, 8, 11, 15, 21, 29, 40, 56], dtype=np.int64)  # samples on either side
+REACHES = np.array([2, 3, 4, 6, 8, 11, 15, 21, 29, 40, 56, 80, 112, 160], dtype=np.int64)
+"""Half-widths of the windows, in samples."""
 WIDTH = 2.2  # standard deviations on either side of a value
 
 
-@compiled("void(float64[::1], float64[::1], float64, float64, int64[::1], float64[::1], float64[::1])")
+@compiled("void(float64[::1], float64[::1], float64, float64, int64[::1], int64, float64[::1], float64[::1])")
 def _windows(
-    t: Array, x: Array, sigma: float, width: float, reaches: NDArray[np.int64], out: Array, std: Array
+    t: Array, x: Array, sigma: float, width: float, reaches: NDArray[np.int64], side: int, out: Array, std: Array
 ) -> None:
+    """Values by windows around each sample (`side` 0), after it (1) or before it (−1), where they are surer."""
     n = t.shape[0]
     for i in range(n):
-        out[i], std[i] = x[i], sigma
         low, high = x[i] - width * sigma, x[i] + width * sigma
         s0 = 1.0
         s1 = s2 = s3 = s4 = 0.0
         x0 = x1 = x2 = xx = 0.0  # of x less x[i]
         done = 0
         for reach in reaches:
-            first, last = i - reach, i + reach
+            first = i - reach if side == 0 else (i if side > 0 else i - 2 * reach)
+            last = i + reach if side == 0 else (i + 2 * reach if side > 0 else i)
             if first < 0 or last >= n:
                 break
             unit = t[last] - t[first]
-            # Moments in units of the last window's width would need rescaling; times are small against 1 s here.
-            for k in range(done + 1, reach + 1):
-                for j in (i - k, i + k):
+            for k in range(done + 1, last - first - (reach if side == 0 else 0) + 1):
+                for half in range(2 if side == 0 else 1):
+                    j = i - k if (half == 1 or side < 0) else i + k
                     u = t[j] - t[i]
                     d = x[j] - x[i]
                     uu = u * u
@@ -52,7 +57,7 @@ def _windows(
                     x1 += d * u
                     x2 += d * uu
                     xx += d * d
-            done = reach
+            done = reach if side == 0 else 2 * reach
             # normal equations with u scaled to order one
             a1, a2, a3, a4 = s1 / unit, s2 / unit**2, s3 / unit**3, s4 / unit**4
             b0, b1, b2 = x0, x1 / unit, x2 / unit**2
@@ -77,7 +82,8 @@ def _windows(
             low, high = max(low, value - width * error), min(high, value + width * error)
             if low > high:
                 break
-            out[i], std[i] = value, error
+            if error < std[i]:
+                out[i], std[i] = value, error
 
 
 def resolution(values: Array) -> float:
@@ -95,7 +101,7 @@ def position_noise(position_mm: Array) -> float:
     return max(jitter(position_mm), 0.0 if step > 0.01 * np.ptp(position_mm) else step / np.sqrt(12.0))
 
 
-def felt(time_s: Array, position_mm: Array) -> tuple[Array, Array]:
+def smoothed(time_s: Array, position_mm: Array) -> tuple[Array, Array]:
     """(positions without most of their noise (n,), standard deviation of what is left (n,)), mm.
 
     `time_s` (n,) increases strictly. Positions without noise come back as they are.
@@ -104,6 +110,26 @@ def felt(time_s: Array, position_mm: Array) -> tuple[Array, Array]:
     if sigma <= 1e-7 * max(float(np.ptp(position_mm)), 1e-9) or len(time_s) < 8:
         return position_mm, np.zeros(len(position_mm))
     time, position = np.ascontiguousarray(time_s), np.ascontiguousarray(position_mm)
-    out, std = np.empty(len(time)), np.empty(len(time))
-    _windows(time, position, sigma, WIDTH, REACHES, out, std)
+    out, std = position.copy(), np.full(len(time), sigma)
+    for side in (0, 1, -1):
+        _windows(time, position, sigma, WIDTH, REACHES, side, out, std)
     return out, std
+
+
+@dataclass(frozen=True)
+class Felt:
+    """The motion as the pad felt it: `time_s`, `position_mm` (k,) with nodes between samples where they matter;
+    `std_mm` (k,): what is left of the noise; `noise_mm`: what it was."""
+
+    time_s: Array
+    position_mm: Array
+    std_mm: Array
+    noise_mm: float
+
+
+def felt(time_s: Array, position_mm: Array) -> Felt:
+    """Smoothed positions, and the motion between them rebuilt (`bench.motion_between`)."""
+    clean, std = smoothed(time_s, position_mm)
+    left = float(np.median(std)) if len(std) else 0.0
+    time, position = motion_between(time_s, clean, noise_mm=left)
+    return Felt(time, position, np.asarray(np.interp(time, time_s, std)), position_noise(position_mm))

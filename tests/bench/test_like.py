@@ -1,0 +1,79 @@
+"""A fitted model held against the run it was fitted to: the surface that the fit moved is found again."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.cli import main
+from bench.config import load_model
+from bench.like import likeness
+from bench.recording import read_recording, write_csv
+from tests.bench.run.benches import SHORT, run
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """A short run, and the fit of it."""
+    folder = tmp_path_factory.mktemp("like")
+    done = run(folder, SHORT)
+    model, result = folder / "model.yaml", folder / "fit.json"
+    arguments = ["--law", "exponential", "--order", "2", "--contact", "unilateral"]
+    assert main(["fit", str(done.folder), *arguments, "--write", str(model), "--json", str(result)]) == 0
+    return done, model, json.loads(result.read_text())
+
+
+def said_rmse(text: str) -> float:
+    found = re.search(r"RMS difference to the data ([0-9.e+-]+) N", text)
+    assert found is not None
+    return float(found.group(1))
+
+
+def test_simulate_agrees_with_the_fit(fitted, tmp_path, capsys):
+    done, model, fit = fitted
+    capsys.readouterr()
+    assert main(["simulate", str(model), "--like", str(done.folder), "--out", str(tmp_path / "out.csv")]) == 0
+    said = capsys.readouterr().out
+    assert said_rmse(said) == pytest.approx(fit["rmse"], rel=2e-3)
+    assert "surface taken" in said
+
+
+@pytest.mark.parametrize("off_mm", [0.02, -0.02])
+def test_a_surface_that_is_off_is_found_within_its_doubt(fitted, off_mm):
+    done, model, fit = fitted
+    m = done.recording.measurement()
+    here = likeness(load_model(str(model)), m)
+    moved = replace(m, position_mm=m.position_mm - off_mm, surface_std_mm=0.02)
+    certain = likeness(load_model(str(model)), replace(moved, surface_std_mm=0.0))
+    doubted = likeness(load_model(str(model)), moved)
+    assert certain.moved_mm == 0 and certain.sentence == "" and certain.rmse_N > 2 * here.rmse_N
+    assert doubted.moved_mm == pytest.approx(here.moved_mm + off_mm, abs=5e-4)
+    assert doubted.rmse_N == pytest.approx(here.rmse_N, rel=1e-3)
+    assert np.array_equal(doubted.measurement.position_mm, moved.position_mm), "the data stay as they were"
+
+
+def test_a_surface_is_not_moved_beyond_its_doubt(fitted):
+    done, model, _ = fitted
+    m = done.recording.measurement()
+    far = replace(m, position_mm=m.position_mm - 0.1, surface_std_mm=0.001)
+    found = likeness(load_model(str(model)), far)
+    assert 0 < found.moved_mm <= 0.006
+
+
+def test_csv_is_taken_as_it_is(fitted, tmp_path, capsys):
+    done, model, _ = fitted
+    m = done.recording.measurement()
+    data = tmp_path / "data.csv"
+    position = np.interp(m.force_time_s, m.position_time_s, m.position_mm)
+    write_csv(data, m.force_time_s, position, m.force_time_s, m.force_N)
+    capsys.readouterr()
+    assert main(["simulate", str(model), "--like", str(data), "--out", str(tmp_path / "out.csv")]) == 0
+    said = capsys.readouterr().out
+    read = read_recording(data).measurement()
+    simulated = load_model(str(model)).simulate_at(read.position_time_s, read.position_mm, read.force_time_s)
+    assert said_rmse(said) == pytest.approx(float(np.sqrt(np.mean((read.force_N - simulated) ** 2))), rel=1e-4)
+    assert "surface" not in said
