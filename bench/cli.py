@@ -92,6 +92,8 @@ def parser(command: str | None) -> tuple[Parser, Parser]:
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command; returns the exit status of docs/formats.md."""
+    for library in ("OPENBLAS", "OMP", "MKL"):  # small matrices: several threads cost more than they give
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     words = sys.argv[1:] if argv is None else argv
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

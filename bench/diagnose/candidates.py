@@ -83,9 +83,12 @@ def forms(structure: Structure, in_air: bool, reach: Reach) -> list[tuple[Effect
     present = {c.id for c in structure.causes}
     out = []
     for effect in all_effects().values():
-        if effect.id in CHANNEL or effect.id in present:
+        if effect.id in CHANNEL:
             continue
         for form in effect.forms:
+            # A second block of a cause that is there already asks whether only its shape is another.
+            if effect.id in present and (form.amend is not None or form.time_shift is not None):
+                continue
             if in_air and not _in_air(form):
                 continue
             if not form.sought or (form.amend is not None and not _amends(structure, form)):
@@ -120,11 +123,14 @@ class Signatures:
         self.jacobian = J[:, : len(fit.x) - (1 if fit.structure.doubt_mm > 0 else 0)]
         norm = np.linalg.norm(J, axis=0)
         J = J[:, norm > 1e-9 * max(float(norm.max(initial=0.0)), 1e-300)]
-        self.Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
+        Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
+        self.Q = [np.ascontiguousarray(q) for q in Q.T]
         self.residual = self._clear(self.scale * (data.force_N - self.force))
 
     def _clear(self, column: Array) -> Array:
-        return np.asarray(column - self.Q @ (self.Q.T @ column))
+        for q in self.Q:
+            column = column - float(np.sum(q * column)) * q
+        return column
 
     def of(self, cause: Cause) -> tuple[float, float]:
         """(χ² that the cause's signature takes, amplitude at which it does); amplitude within the bounds."""
@@ -137,12 +143,13 @@ class Signatures:
         added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
         x = _with(self.fit, added)
         column = self._clear(self.scale * (force_at(self.data, structure, x) - self.force) / size)
-        square = float(column @ column)
+        square = float(np.sum(column * column))
         if not np.isfinite(square) or square <= 1e-18:
             return 0.0, 0.0
-        best = float(column @ self.residual) / square
+        along = float(np.sum(column * self.residual))
+        best = along / square
         best = min(max(best, amplitude.lower), amplitude.upper)
-        return best * (2 * float(column @ self.residual) - best * square), best
+        return best * (2 * along - best * square), best
 
 
 def _with(fit: Fit, added: Array) -> Array:

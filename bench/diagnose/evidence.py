@@ -13,7 +13,7 @@ from .refit import Fit
 LEVEL = 0.01  # of a false alarm over all that is tried
 TRIED = 150.0  # candidates with their starts, as independent tries
 CRUMB = 0.002  # of the noise power: what is smaller is no finding
-SHARE = 0.003  # of what all causes take together: what a further cause must take at the least
+SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 
 
 @dataclass(frozen=True)

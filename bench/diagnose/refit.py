@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.identify._kernel import accumulate
 from bench.identify.solver import minimise
 
 from .data import Data
@@ -64,7 +65,7 @@ def errors(data: Data, structure: Structure, x: Array) -> Array:
 def chi2(data: Data, structure: Structure, x: Array) -> float:
     """Σ w e²/σ², and what a moved surface costs."""
     e = errors(data, structure, x)
-    return float(e @ e + structure.prior @ x**2)
+    return float(np.sum(e * e) + np.sum(structure.prior * x**2))
 
 
 def mean_square(data: Data, structure: Structure, x: Array) -> float:
@@ -94,6 +95,14 @@ def jacobian(
     return out
 
 
+def products(e: Array, J: Array) -> tuple[Array, Array]:
+    """Jᵀe (P,), JᵀJ (P, P). Without BLAS, whose threads cost more than they give on arrays of this shape."""
+    P = J.shape[1]
+    gradient, matrix = np.zeros(P), np.zeros((P, P))
+    accumulate(np.ones(len(e)), np.ascontiguousarray(e), np.zeros(len(e)), np.ascontiguousarray(J), gradient, matrix)
+    return gradient, np.tril(matrix) + np.tril(matrix, -1).T
+
+
 def refit(
     data: Data,
     structure: Structure,
@@ -121,9 +130,9 @@ def refit(
         else:
             before, then, J = last
             way = x - before
-            square = float(way @ way)
+            square = float(np.sum(way * way))
             if square > 0.0:
-                J = J + np.outer((scale * (force - then) - J @ way) / square, way)
+                J = J + np.outer((scale * (force - then) - np.sum(J * way, axis=1)) / square, way)
         steps += 1
         last[:] = [x.copy(), force, J]
         return J
@@ -132,8 +141,9 @@ def refit(
         force = force_at(data, structure, x)
         J = derivatives(x, force)
         e = scale * (data.force_N - force)
-        value = float(e @ e + prior @ x**2)
-        return value, J.T @ e - prior * x, J.T @ J + np.diag(prior)
+        value = float(np.sum(e * e) + np.sum(prior * x**2))
+        gradient, matrix = products(e, J)
+        return value, gradient - prior * x, matrix + np.diag(prior)
 
     solution = minimise(
         normal, lambda x: chi2(data, structure, x), x0, structure.lower, structure.upper, max_steps, tolerance
@@ -141,7 +151,7 @@ def refit(
     if exact and steps > 1:  # the matrix says how sure the numbers are
         J = jacobian(data, structure, solution.x)
         J[~np.isfinite(J)] = 0.0
-        return Fit(structure, solution.x, solution.cost, J.T @ J + np.diag(prior), solution.converged)
+        return Fit(structure, solution.x, solution.cost, products(J[:, 0], J)[1] + np.diag(prior), solution.converged)
     return Fit(structure, solution.x, solution.cost, solution.matrix, solution.converged)
 
 

@@ -28,6 +28,8 @@ FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
 WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
+LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
+SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 MOST_CAUSES = 3
 
 
@@ -194,7 +196,9 @@ class Search:
         return self._trial(done)
 
     def _trial(self, fit: Fit) -> Trial:
-        return Trial(fit.structure.causes[-1], fit, fit.chi2 + self._penalty(fit))
+        cause = fit.structure.causes[-1]
+        unusual = 0.0 if cause.form.name == cause.effect.forms[0].name else LATER * self.prepared.colour.memory
+        return Trial(cause, fit, fit.chi2 + self._penalty(fit) + unusual)
 
     def _penalty(self, fit: Fit) -> float:
         return penalty(fit.free, self.effective) * self.prepared.colour.memory
@@ -208,16 +212,20 @@ class Search:
         """Causes one after the other while each pays; then those that others have made needless go."""
         path = Path([base])
         while len(path.fits) <= MOST_CAUSES:
-            ranked = [t for t in self.ranked(path.fits[-1]) if believable(t.fit, self.prepared)]
+            every = [t for t in self.ranked(path.fits[-1]) if believable(t.fit, self.prepared)]
+            present = {c.id for c in path.fits[-1].structure.causes}
+            ranked = [t for t in every if t.id not in present]
             if not ranked:
                 break
             best = ranked[0]
+            reshaped = min((t.fit.chi2 for t in every if t.id in present), default=np.inf)
             now = path.fits[-1] = self.settled(path.fits[-1], best.fit)
             base = path.fits[0]
             found = self.judge(now, best.fit, base)
             path.rivals.append(ranked)
             path.evidence.append(found)
-            if not found.pays:
+            gained = now.chi2 - best.fit.chi2
+            if not found.pays or now.chi2 - reshaped > SAME * gained:
                 break
             path.fits.append(best.fit)
             if len(path.fits) > 2:

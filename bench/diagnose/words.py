@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
-from .result import CauseFound, Diagnosis
+from sim.effects import all_effects
+
+from .result import Alternative, CauseFound, Diagnosis
 
 NAMES = {
     "adhesion": "adhesion",
@@ -35,29 +37,72 @@ NAMES = {
     "viscous_damping": "viscous damping",
 }
 
+SHOWN = 6
+"""Numbers of one cause that a terminal shows."""
+NEAR = 0.5
+"""Share of the gain from which an excluded rival is worth a word."""
+REMAINS = 3
+"""Sentences on what is left."""
+
 
 def name_of(id_: str) -> str:
     """What a person calls the effect; its id where nobody has said."""
     return NAMES.get(id_, id_.replace("_", " "))
 
 
-def headline(d: Diagnosis) -> str:
-    """The verdict in one sentence."""
+def named(d: Diagnosis) -> str:
+    """The causes' names as one phrase."""
+    names = [name_of(c.id) for c in d.causes]
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def in_air(d: Diagnosis) -> bool:
+    """Whether the bench was looked at in free air, without a pad."""
+    return bool(d.model_dict.get("pad", {}).get("elastic", {}).get("law") == "none")
+
+
+def force(value_N: float, digits: int = 3) -> str:
+    """A force for reading: mN where it is small."""
+    return f"{1e3 * value_N:.{digits}g} mN" if abs(value_N) < 0.5 else f"{value_N:.{digits}g} N"
+
+
+def percent(share: float) -> str:
+    """A share for reading; never 100 % where something is missing."""
+    value = 100 * share
+    if 99.5 <= value < 99.95:
+        return f"{value:.1f} %"
+    return f"{value:.0f} %" if value >= 9.5 else f"{value:.2g} %"
+
+
+def verdict(d: Diagnosis) -> str:
+    """The verdict in a few words."""
+    what = "The bench in free air" if in_air(d) else "The model"
     if d.verdict == "consistent":
         return (
-            f"consistent: the model explains these data down to their noise ({1e3 * d.rmse_before:.3g} mN of error, "
-            f"{1e3 * d.noise_floor:.3g} mN of noise)"
+            f"{what} explains these data down to their noise" if not in_air(d) else f"{what} adds nothing to the noise"
         )
-    names = " and ".join(name_of(c.id) for c in d.causes)
-    error = f"error {1e3 * d.held_out_before:.3g} mN → {1e3 * d.held_out_after:.3g} mN on data held out"
-    noise = f"noise {1e3 * d.noise_floor:.3g} mN"
     if d.verdict == "explained":
-        return f"explained by {names}: {error} ({noise})"
+        return f"What {'the bench adds' if in_air(d) else 'the model gets wrong'} is explained by {named(d)}"
     if d.causes:
-        return (
-            f"unexplained: {names} takes {100 * (1 - d.left):.0f} % of it, no known cause the rest; {error} ({noise})"
-        )
-    return f"unexplained: no known cause takes what is left; {error} ({noise})"
+        return f"Unexplained: {named(d)} takes {percent(1 - d.left)} of the error, no known cause the rest"
+    return "Unexplained: no known cause takes what is left"
+
+
+def errors(d: Diagnosis) -> str:
+    """The errors beside the noise in one sentence."""
+    if d.verdict == "consistent":
+        return f"error {force(d.rmse_before)}, noise {force(d.noise_floor)}"
+    digits = 3 if force(d.held_out_before) != force(d.held_out_after) else 5
+    before, after, noise = (force(v, digits) for v in (d.held_out_before, d.held_out_after, d.noise_floor))
+    return f"error {before} → {after} on data held out (noise {noise})"
+
+
+def headline(d: Diagnosis) -> str:
+    """The verdict in one line, its word first."""
+    if d.verdict == "explained":
+        return f"explained by {named(d)}: {errors(d)}"
+    said = verdict(d).removeprefix("Unexplained: ")
+    return f"{d.verdict}: {said[:1].lower()}{said[1:]}; {errors(d)}"
 
 
 def lines(d: Diagnosis) -> list[str]:
@@ -66,28 +111,66 @@ def lines(d: Diagnosis) -> list[str]:
     for number, cause in enumerate(d.causes, 1):
         out += _cause(number, cause)
     if d.flagged_fraction > 0:
-        out.append(f"  {100 * d.flagged_fraction:.2g} % of the force samples are flagged and left out")
-    for r in [r for r in d.remainders if r.passed][:3] if d.verdict != "consistent" else []:
-        out.append(f"  what is left {r.sentence} ({100 * r.share:.2g} % of its power)")
+        out.append(f"  {percent(d.flagged_fraction)} of the force samples are flagged and left out")
+    if d.verdict != "consistent":
+        out += [f"  {sentence}" for sentence in remains(d)]
+    if d.verdict == "unexplained":
+        out.append(
+            "  no cause of the catalogue (docs/effects.md) does this: look at what remains before trusting the model"
+        )
     if d.next_protocol is not None:
-        out.append(f"  next test: {d.next_protocol['description']}")
+        out.append(f"  next test: {d.next_protocol['description']} (`--next FILE` writes the protocol)")
     return out
 
 
-def _cause(number: int, cause: CauseFound) -> list[str]:
-    sure = f"{100 * min(cause.confidence, 0.99):.0f} % sure"
-    out = [f"  {number}. {name_of(cause.id)} ({cause.form}): takes {100 * cause.gain:.3g} % of the error, {sure}"]
-    out.append(f"     {cause.explanation}")
-    numbers = []
+def remains(d: Diagnosis, most: int = REMAINS) -> list[str]:
+    """What is left has structure: in sentences."""
+    told = [r for r in d.remainders if r.passed]
+    return [f"what is left {r.sentence} ({percent(r.share)} of its power)" for r in told[:most]]
+
+
+def sure(cause: CauseFound) -> str:
+    """How sure the name is."""
+    return "more than 99 % sure" if cause.confidence > 0.99 else f"{100 * cause.confidence:.0f} % sure"
+
+
+def doubtful(cause: CauseFound) -> list[Alternative]:
+    """What these data cannot exclude in the cause's place."""
+    return [a for a in cause.alternatives if not a.excluded]
+
+
+def rivals(cause: CauseFound) -> str:
+    """What else it could be, in one sentence; empty where nothing comes near."""
+    open_ = doubtful(cause)
+    if open_:
+        said = ", ".join(f"{name_of(a.id)} ({percent(a.gain_share)} of the gain)" for a in open_)
+        return f"these data cannot exclude: {said}"
+    near = [a for a in cause.alternatives if a.gain_share >= NEAR]
+    if near:
+        return f"excluded, though near: {name_of(near[0].id)} ({percent(near[0].gain_share)} of the gain)"
+    return ""
+
+
+def numbers(cause: CauseFound, most: int = SHOWN) -> str:
+    """The cause's numbers with their doubts; those that were not fitted are left out."""
+    form = all_effects()[cause.id].form(cause.form) if cause.id in all_effects() else None
+    fixed = {p.name for p in form.parameters if p.fixed} if form is not None else set()
+    said = []
     for name, n in cause.parameters.items():
+        if name in fixed:
+            continue
         doubt = f" ± {n.std:.2g}" if math.isfinite(n.std) else ""
-        unit = "" if n.unit in ("1", "") else f" {n.unit}"
-        numbers.append(f"{name} = {n.value:.4g}{doubt}{unit}")
-    out.append("     " + ", ".join(numbers))
-    doubtful = [a for a in cause.alternatives if not a.excluded]
-    if doubtful:
-        named = ", ".join(f"{name_of(a.id)} ({100 * a.gain_share:.0f} % of the gain)" for a in doubtful)
-        out.append(f"     these data cannot exclude: {named}")
-    if cause.check:
-        out.append(f"     check: {cause.check}")
+        unit = "" if n.unit in ("1", "") else f" {n.unit.replace('*', '·')}"
+        said.append(f"{name} = {n.value:.4g}{doubt}{unit}")
+    if len(said) > most:
+        said = [*said[: most - 1], f"and {len(said) - most + 1} more"]
+    return ", ".join(said)
+
+
+def _cause(number: int, cause: CauseFound) -> list[str]:
+    out = [f"  {number}. {name_of(cause.id)} ({cause.form}): {percent(cause.gain)} of the error, {sure(cause)}"]
+    out.append(f"     {cause.explanation}")
+    for line in (numbers(cause), rivals(cause), f"check: {cause.check}" if cause.check else ""):
+        if line:
+            out.append(f"     {line}")
     return out
