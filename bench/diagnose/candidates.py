@@ -28,7 +28,8 @@ CHANNEL = ("outliers", "stuck_samples", "mains_hum")  # found by detectors, not 
 MOST_STARTS = 96
 PERIODS = 22
 MANY = 20
-LONGEST_PERIOD = 0.9  # of the travel: a longer one is another law, not a period
+LONGEST_PERIOD = 1.6  # of the travel
+LONGEST_REPORTED = 0.6  # of the travel, for errors of the position: longer ones are another elastic law
 
 
 @dataclass(frozen=True)
@@ -52,10 +53,11 @@ class Reach:
 
 def narrowed(form: Form, reach: Reach) -> Form:
     """The form with its parameters kept within what the data can tell of, and started there."""
-    return replace(form, parameters=tuple(_narrowed(p, reach) for p in form.parameters))
+    longest = LONGEST_REPORTED if "report" in form.blocks else LONGEST_PERIOD
+    return replace(form, parameters=tuple(_narrowed(p, reach, longest) for p in form.parameters))
 
 
-def _narrowed(p: Parameter, reach: Reach) -> Parameter:
+def _narrowed(p: Parameter, reach: Reach, longest: float) -> Parameter:
     lower, upper, starts, default = p.lower, p.upper, p.starts, p.if_left_out
     if p.unit == "1/s" and p.logarithmic:
         lower, upper = max(lower, 0.3 / reach.span_s), min(upper, 0.6 / reach.sample_s)
@@ -64,12 +66,12 @@ def _narrowed(p: Parameter, reach: Reach) -> Parameter:
     elif p.unit == "s" and p.logarithmic:
         upper = min(upper, 3.0 * reach.span_s)
     elif p.name == "period":
-        lower, upper = max(lower, 0.03 * reach.travel_mm), min(upper, LONGEST_PERIOD * reach.travel_mm)
-        starts = tuple((reach.travel_mm / np.linspace(1.12, 12.0, PERIODS)).tolist())
+        lower, upper = max(lower, 0.03 * reach.travel_mm), min(upper, longest * reach.travel_mm)
+        starts = tuple((reach.travel_mm / np.linspace(1.04 / longest, 12.0, PERIODS)).tolist())
     elif p.name == "reach":
         default = reach.depth_mm
     elif p.name == "limit" and p.unit == "N":
-        starts = (0.55 * reach.force_N, 0.75 * reach.force_N, 0.9 * reach.force_N)
+        starts = tuple(share * reach.force_N for share in (0.6, 0.8, 0.93, 0.985))
     if lower >= upper:
         return p
     starts = tuple(v for v in starts if lower <= v <= upper)

@@ -5,19 +5,24 @@ Asked before any model, and again about what a model leaves: transients look lik
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
 from bench.felt_motion import resolution
+from bench.identify.motion import holds
+from bench.recording.types import Measurement
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
+SETTLING = 20  # samples after a move that are not yet a hold
+CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
 CEILING = 8  # samples in a row at the greatest force
+BESIDE = 5  # neighbours on either side that a stray sample is held against: bursts are shorter
 FAR = 6.0  # noise deviations that an outlier stands off at the least
 DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
 RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data
@@ -114,11 +119,11 @@ def _spikes(force: Array, good: Mask) -> Mask:
         return mask
     noise = 1.4826 * float(np.median(np.abs(np.diff(y, 2) - np.median(np.diff(y, 2))))) / np.sqrt(6.0)
     noise = max(noise, resolution(force) / np.sqrt(12.0), 1e-12)
-    padded = np.pad(y, 3, mode="edge")
-    around = np.stack([padded[k : k + len(y)] for k in (0, 1, 2, 4, 5, 6)])
+    padded = np.pad(y, BESIDE, mode="edge")
+    around = np.stack([padded[k : k + len(y)] for k in range(2 * BESIDE + 1) if k != BESIDE])
     middle = np.median(around, axis=0)
     spread = np.sort(around, axis=0)
-    reach = spread[-2] - spread[1]  # in a move the neighbours themselves lie apart
+    reach = spread[-3] - spread[2]  # in a move the neighbours themselves lie apart
     off = np.abs(y - middle)
     quiet = reach <= np.quantile(reach, 0.5)  # in holds the differences are noise alone
     limit = max(far((y - middle)[quiet]), FAR * noise)
@@ -141,6 +146,22 @@ def far(values: Array) -> float:
     degrees = float(DEGREES[k])
     scale = q50 / float(student_t.ppf(0.75, degrees))
     return scale * max(float(student_t.isf(RARE / len(values) / 2, degrees)), FAR)
+
+
+def not_of_the_motion(m: Measurement, found: Faults) -> Faults:
+    """Without the outliers in moves, where these have many more than the holds: transients that no model made yet."""
+    if not found.outlier.any():
+        return found
+    still = np.zeros(len(m.force_N), dtype=bool)
+    for s in holds(m.position_time_s, m.position_mm):
+        first, last = np.searchsorted(m.force_time_s, [m.position_time_s[s.start], m.position_time_s[s.stop - 1]])
+        settled = int(first) + min(int(last - first) // 4, SETTLING)
+        still[settled : int(last)] = True
+    in_holds = (found.outlier & still).sum() / max(still.sum(), 1)
+    in_moves = (found.outlier & ~still).sum() / max((~still).sum(), 1)
+    if still.sum() > 50 and in_moves > CROWDED * in_holds + 2.0 / max((~still).sum(), 1):
+        return replace(found, outlier=found.outlier & still)
+    return found
 
 
 def standing_off(residual: Array, good: Mask) -> Mask:

@@ -15,7 +15,7 @@ from bench.recording.types import Measurement
 from sim.model import Model
 from sim.pad import Pad
 
-from .channel import Faults, faults, standing_off
+from .channel import Faults, faults, not_of_the_motion, standing_off
 from .channel_causes import channel_causes, hum_cause
 from .data import Prepared, prepare
 from .numbers import PadNumbers, Structure, cause_of
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 TOLD = 0.002  # of the noise power
+LEAST = 0.004  # of the error beyond the noise: what a cause must take of the data held out
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 RIVALS = 4  # models of the best single causes that are kept
 
@@ -42,10 +43,10 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     begun = time.perf_counter()
     tell = progress or (lambda _: None)
     tell("reading the channels")
-    flags = faults(m.force_N)
+    flags = not_of_the_motion(m, faults(m.force_N))
     prepared = prepare(m, flags.good)
     structure = believed_structure(believed, prepared)
-    search = Search(prepared, structure, tell)
+    search = Search(prepared, structure, tell, ["saturation"] if flags.saturated.any() else [])
     tell("refitting what is believed")
     base = search.base(_pads(m, believed, structure, flags.good))
     tell("looking for causes")
@@ -57,6 +58,10 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     fits = chain(prepared, final, base)
     floor = _floor(prepared, final)
     squares, excess = excesses(prepared, fits, floor)
+    while len(fits) > 1 and excess[-2] - excess[-1] <= LEAST * excess[0]:  # it predicts nothing that was held out
+        fits, squares, excess = fits[:-1], squares[:-1], excess[:-1]
+    if len(fits) == 1:
+        squares, excess = excesses(prepared, fits, floor)
     whole = _whole(prepared, fits)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
 
@@ -122,9 +127,9 @@ def _asked_again(
     outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known)
     if outlier.sum() == flags.outlier.sum() and np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
-    flags = replace(flags, outlier=outlier)
+    flags = not_of_the_motion(m, replace(flags, outlier=outlier))
     prepared = prepare(m, flags.good)
-    again = Search(prepared, search.believed, search.progress)
+    again = Search(prepared, search.believed, search.progress, search.known)
     path = replace(path, fits=[onto(f, prepared.short, 15, 1e-8) for f in path.fits])
     return prepared, flags, again, path
 

@@ -59,8 +59,11 @@ class Path:
 class Search:
     """One search on one measurement. `progress` is told what goes on."""
 
-    def __init__(self, prepared: Prepared, structure: Structure, progress: Callable[[str], None]) -> None:
-        self.prepared, self.progress = prepared, progress
+    def __init__(
+        self, prepared: Prepared, structure: Structure, progress: Callable[[str], None], known: Sequence[str] = ()
+    ) -> None:
+        """`known`: ids that detectors have found already."""
+        self.prepared, self.progress, self.known = prepared, progress, tuple(known)
         self.short = prepared.short
         self.believed = structure
         self.samples = float(prepared.full.weight.sum())
@@ -91,7 +94,7 @@ class Search:
         wanted = [
             pair
             for pair in forms(fit.structure, fit.structure.in_air, self.reach)
-            if only is None or pair[0].id in only
+            if (only is None or pair[0].id in only) and pair[0].id not in self.known
         ]
         self.progress(f"signatures of {len(wanted)} shapes")
         by_id: dict[str, list[Start]] = {}
@@ -184,7 +187,7 @@ class Search:
         x = self.believed.x(self.believed.pad.x())
         return jacobian(self.short, self.believed, x)[:, : len(x) - (1 if self.believed.doubt_mm > 0 else 0)]
 
-    def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array) -> Trial | None:
+    def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
         structure = fit.structure.with_cause(cause)
         own = structure.x(fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
         return self._solved(structure, extended(fit, structure, own), steps, known)
@@ -211,6 +214,7 @@ class Search:
     def path(self, base: Fit) -> Path:
         """Causes one after the other while each pays; then those that others have made needless go."""
         path = Path([base])
+        recurved = False
         while len(path.fits) <= MOST_CAUSES:
             every = [t for t in self.ranked(path.fits[-1]) if believable(t.fit, self.prepared)]
             present = {c.id for c in path.fits[-1].structure.causes}
@@ -225,12 +229,36 @@ class Search:
             path.rivals.append(ranked)
             path.evidence.append(found)
             gained = now.chi2 - best.fit.chi2
+            if found.pays and not recurved:
+                recurved, other = True, self.recurved(now)
+                if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but a law of another shape
+                    path.fits[-1] = other
+                    del path.rivals[-1], path.evidence[-1]
+                    continue
             if not found.pays or now.chi2 - reshaped > SAME * gained:
                 break
             path.fits.append(best.fit)
             if len(path.fits) > 2:
                 path.fits[-1] = self.exchanged(path)
         return path
+
+    def recurved(self, now: Fit) -> Fit:
+        """The fit with another form of a law that was put in place of the believed one, where that fits better."""
+        best = now
+        for index, cause in enumerate(now.structure.causes):
+            if cause.form.amend is None or cause.amplitude is not None or not cause.fitted:
+                continue
+            structure, x = reduced(now, index)
+            without = refit(self.short, structure, x, 10, 1e-5)
+            signatures = Signatures(self.short, without)
+            for effect, form in forms(structure, False, self.reach):
+                if effect.id != cause.id or form.name == cause.form.name:
+                    continue
+                for s in starts(signatures, effect, form):
+                    trial = self._joined(without, s.cause, ALL, None)
+                    if trial is not None and trial.fit.chi2 < best.chi2:
+                        best = trial.fit
+        return best
 
     def settled(self, now: Fit, joined: Fit) -> Fit:
         """The fit before a cause was added, or a better one that the addition has led to: a valley may be long."""

@@ -53,7 +53,8 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
     for number, (square, fit) in enumerate(zip(squares, fits, strict=True)):
         doubt = floor_N**2 * (2.0 * np.sqrt(2.0 * memory / n) + 2.0 * fit.free * memory / n)
         excess = square - floor_N**2
-        out.append(max(excess, 0.0) if number == 0 or excess > doubt else 0.0)
+        joined = number == 0 and len(fits) > 1
+        out.append(max(excess, 0.0) if joined or excess > doubt else 0.0)
     return squares, out
 
 

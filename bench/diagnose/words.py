@@ -101,8 +101,12 @@ def headline(d: Diagnosis) -> str:
     """The verdict in one line, its word first."""
     if d.verdict == "explained":
         return f"explained by {named(d)}: {errors(d)}"
-    said = verdict(d).removeprefix("Unexplained: ")
-    return f"{d.verdict}: {said[:1].lower()}{said[1:]}; {errors(d)}"
+    return f"{d.verdict}: {lowered(verdict(d).removeprefix('Unexplained: '))}; {errors(d)}"
+
+
+def lowered(sentence: str) -> str:
+    """A sentence as it goes on after a colon."""
+    return sentence[:1].lower() + sentence[1:]
 
 
 def lines(d: Diagnosis) -> list[str]:
@@ -131,7 +135,7 @@ def remains(d: Diagnosis, most: int = REMAINS) -> list[str]:
 
 def sure(cause: CauseFound) -> str:
     """How sure the name is."""
-    return "more than 99 % sure" if cause.confidence > 0.99 else f"{100 * cause.confidence:.0f} % sure"
+    return "over 99 % sure" if cause.confidence > 0.99 else f"{100 * cause.confidence:.0f} % sure"
 
 
 def doubtful(cause: CauseFound) -> list[Alternative]:

@@ -62,7 +62,7 @@ _PULL_OFF = Parameter(
     "greatest pull",
     required=True,
     amplitude=True,
-    floor=("force_noise_N", 0.3),
+    floor=("force_noise_N", 0.05),
 )
 _RANGE = Parameter(
     "range", "mm", 1e-4, 20.0, 0.1, "gap over which the pull goes", required=True, starts=(0.02, 0.1, 0.5)

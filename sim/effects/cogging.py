@@ -41,7 +41,7 @@ _AMPLITUDE = Parameter(
     "force at the crest",
     required=True,
     amplitude=True,
-    floor=("force_noise_N", 0.3),
+    floor=("force_noise_N", 0.05),
 )
 _PERIOD = Parameter(
     "period",

@@ -52,7 +52,7 @@ _AMPLITUDE = Parameter(
     "greatest error",
     required=True,
     amplitude=True,
-    floor=("position_noise_mm", 0.5),
+    floor=("position_noise_mm", 1.0),
 )
 _PERIOD = Parameter(
     "period",

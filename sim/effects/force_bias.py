@@ -37,7 +37,7 @@ EFFECT = Effect(
                     "reported minus true force",
                     required=True,
                     amplitude=True,
-                    floor=("force_noise_N", 0.3),
+                    floor=("force_noise_N", 0.03),
                 ),
             ),
             blocks={"sensor": bias},

@@ -37,7 +37,7 @@ EFFECT = Effect(
                     "stamp of a force minus when it was felt, against the same of the position",
                     required=True,
                     amplitude=True,
-                    floor=("sample_s", 0.15),
+                    floor=("sample_s", 0.05),
                     starts=(0.001, 0.004, 0.015),
                 ),
             ),

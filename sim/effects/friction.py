@@ -120,10 +120,16 @@ _COULOMB = Parameter(
     "friction force while sliding, on either side",
     required=True,
     amplitude=True,
-    floor=("force_noise_N", 0.3),
+    floor=("force_noise_N", 0.05),
 )
 _PRESLIDING = Parameter(
-    "presliding", "mm", 1e-6, 1.0, 0.001, "distance over which friction builds up after a reversal", fixed=True
+    "presliding",
+    "mm",
+    1e-5,
+    0.2,
+    0.001,
+    "distance over which friction builds up after a reversal",
+    starts=(0.001, 0.01),
 )
 
 EFFECT = Effect(

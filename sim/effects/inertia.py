@@ -85,7 +85,9 @@ def sprung(dt: float, y: float, state: State, p: State) -> float:
 
 
 _MASS = Parameter("mass", "kg", 0.0, 50.0, 0.1, "mass beyond the cell", required=True, amplitude=True)
-_WINDOW = Parameter("window", "s", 1e-5, 0.1, 0.002, "least time over which acceleration is taken", fixed=True)
+_WINDOW = Parameter(
+    "window", "s", 1e-5, 0.02, 0.002, "least time over which acceleration is taken", starts=(2e-4, 1e-3, 3e-3)
+)
 
 EFFECT = Effect(
     id="inertia",

@@ -41,7 +41,7 @@ _AMPLITUDE = Parameter(
     "force at the crest",
     required=True,
     amplitude=True,
-    floor=("force_noise_N", 0.1),
+    floor=("force_noise_N", 0.02),
 )
 _FREQUENCY = Parameter(
     "frequency", "Hz", 0.1, 2000.0, 50.0, "frequency", required=True, starts=(50.0, 60.0, 100.0, 120.0)

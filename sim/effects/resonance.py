@@ -1,6 +1,6 @@
 """Resonance of the force path: cell, probe and what holds them swing at their own frequency.
 
-The damping ratio ends at 0.7: beyond, a second-order low-pass has no peak left, and is a sensor lag.
+The damping ratio ends at 0.5: beyond, a second-order low-pass has next to no peak left, and is a sensor lag.
 
 - `low_pass`: all of the force passes ω²/(s² + 2ζω s + ω²).
 - `partial`: a share of it does, the rest passes as it is: a mode of part of the structure, which adds a ringing at each
@@ -62,7 +62,7 @@ _FREQUENCY = Parameter(
     starts=(8.0, 15.0, 30.0, 60.0, 120.0, 240.0, 480.0),
 )
 _DAMPING = Parameter(
-    "damping_ratio", "1", 1e-3, 0.7, 0.1, "damping over critical damping", required=True, starts=(0.03, 0.2)
+    "damping_ratio", "1", 1e-3, 0.5, 0.1, "damping over critical damping", required=True, starts=(0.03, 0.2)
 )
 
 EFFECT = Effect(

@@ -137,7 +137,7 @@ _TIME_CONSTANT = Parameter(
     "how far the reported force comes behind a ramp",
     required=True,
     amplitude=True,
-    floor=("sample_s", 0.15),
+    floor=("sample_s", 0.05),
     starts=(0.002, 0.01, 0.05),
 )
 
