@@ -122,7 +122,7 @@ class Signatures:
         self.force = force_at(data, fit.structure, fit.x)
         self.scale = np.sqrt(data.weight) / data.sigma_N
         J = jacobian(data, fit.structure, fit.x, self.force)
-        self.jacobian = J[:, : len(fit.x) - (1 if fit.structure.doubt_mm > 0 else 0)]
+        self.jacobian = J[:, : len(fit.x) - fit.structure.tail]
         norm = np.linalg.norm(J, axis=0)
         J = J[:, norm > 1e-9 * max(float(norm.max(initial=0.0)), 1e-300)]
         Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
@@ -155,7 +155,7 @@ class Signatures:
 
 
 def _with(fit: Fit, added: Array) -> Array:
-    n = len(fit.x) - (1 if fit.structure.doubt_mm > 0 else 0)
+    n = len(fit.x) - fit.structure.tail
     return np.concatenate([fit.x[:n], added, fit.x[n:]])
 
 

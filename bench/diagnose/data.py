@@ -69,6 +69,7 @@ class Prepared:
     position_noise_mm: float
     sample_s: float
     doubt_mm: float
+    zero_N: float
     depth_mm: float
     force_scale_N: float
 
@@ -138,6 +139,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
         position_noise_mm=motion.noise_mm,
         sample_s=sample_s,
         doubt_mm=m.surface_std_mm,
+        zero_N=m.zero_std_N,
         depth_mm=depth,
         force_scale_N=max(float(np.abs(m.force_N[counted]).max()), 1e-6),
     )

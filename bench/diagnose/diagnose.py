@@ -93,7 +93,7 @@ def believed_structure(model: Model, prepared: Prepared) -> Structure:
     for entry in model.effects:
         active = entry.active()
         causes.append(cause_of(active.effect, active.form, active.values))
-    return Structure(pad, tuple(causes), prepared.doubt_mm)
+    return Structure(pad, tuple(causes), prepared.doubt_mm, prepared.zero_N)
 
 
 def _pads(m: Measurement, believed: Model, structure: Structure, good: Mask) -> list[Array]:

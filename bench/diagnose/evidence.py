@@ -13,6 +13,7 @@ from .refit import Fit
 LEVEL = 0.01  # of a false alarm over all that is tried
 TRIED = 150.0  # candidates with their starts, as independent tries
 CRUMB = 0.002  # of the noise power: what is smaller is no finding
+BEYOND = 3.0  # standard deviations of touch-off and tare, within which neither is found wrong
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 
 
@@ -76,6 +77,11 @@ def believable(fit: Fit, prepared: Prepared) -> bool:
         "position_noise_mm": prepared.position_noise_mm,
         "force_noise_N": prepared.noise.force_N,
     }
+    doubts = {"contact_offset": ("offset", prepared.doubt_mm), "force_bias": ("bias", prepared.zero_N)}
+    if cause.id in doubts:
+        name, std = doubts[cause.id]
+        if abs(values[name]) < BEYOND * std:
+            return False
     for p in cause.form.parameters:
         if p.floor is not None and abs(values[p.name]) < p.floor[1] * limits[p.floor[0]]:
             return False

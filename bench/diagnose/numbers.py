@@ -157,20 +157,24 @@ def _coordinate(p: Parameter) -> Coordinate:
 
 @dataclass(frozen=True)
 class Structure:
-    """A pad with effects, to be fitted: x = [pad, effects in order, surface].
+    """A pad with effects, to be fitted: x = [pad, effects in order, surface, zero].
 
-    `doubt_mm`: standard deviation of the surface, 0: it is certain.
+    `doubt_mm`, `zero_N`: standard deviations of the surface and of the force's zero, as touch-off and tare found them;
+    0: certain, and no entry of x.
     """
 
     pad: PadNumbers
     causes: tuple[Cause, ...] = ()
     doubt_mm: float = 0.0
+    zero_N: float = 0.0
     coordinates: tuple[Coordinate, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         found = [*self.pad.coordinates, *(_coordinate(p) for c in self.causes for p in c.fitted)]
         if self.doubt_mm > 0:
             found.append(Coordinate("surface", -6.0, 6.0, unit=self.doubt_mm))
+        if self.zero_N > 0:
+            found.append(Coordinate("zero", -4.0, 4.0, unit=self.zero_N))
         object.__setattr__(self, "coordinates", tuple(found))
 
     @property
@@ -185,21 +189,27 @@ class Structure:
 
     @property
     def prior(self) -> Array:
-        """What each coordinate squared costs, in χ²: the surface's doubt."""
-        return np.array([1.0 if c.name == "surface" else 0.0 for c in self.coordinates])
+        """What each coordinate squared costs, in χ²: the doubts about surface and zero."""
+        prior = np.zeros(len(self.coordinates))
+        prior[len(prior) - self.tail :] = 1.0
+        return prior
+
+    @property
+    def tail(self) -> int:
+        """How many entries at the end of x belong to the run, and not to pad or causes."""
+        return (self.doubt_mm > 0) + (self.zero_N > 0)
 
     def with_cause(self, cause: Cause) -> Structure:
         """One more cause."""
         return replace(self, causes=(*self.causes, cause))
 
-    def x(self, pad_x: Array, causes: Sequence[Mapping[str, float]] | None = None, surface: float = 0.0) -> Array:
-        """The vector of a pad's own vector, the causes' values (their starts where not given) and the surface's."""
+    def x(self, pad_x: Array, causes: Sequence[Mapping[str, float]] | None = None, tail: Array | None = None) -> Array:
+        """The vector of a pad's own vector, the causes' values (their starts where not given) and the run's own end."""
         values = list(causes) if causes is not None else [c.start for c in self.causes]
         parts = [pad_x]
         for cause, v in zip(self.causes, values, strict=True):
             parts.append(np.array([_coordinate(p).x(v[p.name]) for p in cause.fitted]))
-        if self.doubt_mm > 0:
-            parts.append(np.array([surface]))
+        parts.append(np.zeros(self.tail) if tail is None else tail)
         return np.concatenate(parts)
 
     def values(self, x: Array) -> list[dict[str, float]]:
@@ -221,7 +231,11 @@ class Structure:
 
     def surface_mm(self, x: Array) -> float:
         """Depth added to all positions."""
-        return float(x[-1]) * self.doubt_mm if self.doubt_mm > 0 else 0.0
+        return float(x[len(x) - self.tail]) * self.doubt_mm if self.doubt_mm > 0 else 0.0
+
+    def offset_N(self, x: Array) -> float:
+        """What the force reads without load."""
+        return float(x[-1]) * self.zero_N if self.zero_N > 0 else 0.0
 
     def cascade(self, x: Array) -> Cascade:
         """The plant at x."""

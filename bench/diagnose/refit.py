@@ -54,7 +54,7 @@ def force_at(data: Data, structure: Structure, x: Array) -> Array:
     """Simulated force on the grid (n,), N; not finite where the numbers make no plant."""
     position = data.position_mm + structure.surface_mm(x)
     with np.errstate(all="ignore"):
-        return structure.cascade(x).simulate(data.time_s, position)
+        return structure.cascade(x).simulate(data.time_s, position) + structure.offset_N(x)
 
 
 def errors(data: Data, structure: Structure, x: Array) -> Array:
@@ -162,7 +162,7 @@ def onto(fit: Fit, data: Data, max_steps: int = 25, tolerance: float = 1e-9) -> 
 
 def extended(fit: Fit, structure: Structure, added: Array) -> Array:
     """x of a structure with one cause more at its end: the fit's numbers, the cause's, the surface's."""
-    n = len(fit.x) - (1 if fit.structure.doubt_mm > 0 else 0)
+    n = len(fit.x) - fit.structure.tail
     return np.concatenate([fit.x[:n], added, fit.x[n:]])
 
 

@@ -157,7 +157,7 @@ class Search:
             structure = fit.structure.with_cause(cause)
             pad = best.fit.x[: len(structure.pad.coordinates)]
             before = best.fit.structure.values(best.fit.x)[:-1]
-            x = structure.x(pad, [*before, cause.start], _surface_x(best.fit))
+            x = structure.x(pad, [*before, cause.start], _end(best.fit))
             trial = self._solved(structure, x, MORE, None)
             if trial is not None:
                 out.append(trial)
@@ -185,7 +185,7 @@ class Search:
     @cached_property
     def _believed_jacobian(self) -> Array:
         x = self.believed.x(self.believed.pad.x())
-        return jacobian(self.short, self.believed, x)[:, : len(x) - (1 if self.believed.doubt_mm > 0 else 0)]
+        return jacobian(self.short, self.believed, x)[:, : len(x) - self.believed.tail]
 
     def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
         structure = fit.structure.with_cause(cause)
@@ -293,5 +293,6 @@ class Search:
         return best
 
 
-def _surface_x(fit: Fit) -> float:
-    return float(fit.x[-1]) if fit.structure.doubt_mm > 0 else 0.0
+def _end(fit: Fit) -> Array:
+    """The entries of x that belong to the run."""
+    return fit.x[len(fit.x) - fit.structure.tail :]

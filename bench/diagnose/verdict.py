@@ -31,8 +31,8 @@ def ordered(prepared: Prepared, fit: Fit, base: Fit) -> Fit:
     structure = replace(fit.structure, causes=tuple(fit.structure.causes[i] for i in order))
     values = fit.structure.values(fit.x)
     pad = fit.x[: len(fit.structure.pad.coordinates)]
-    surface = fit.x[-1] if fit.structure.doubt_mm > 0 else 0.0
-    return replace(refit(prepared.short, structure, structure.x(pad, [values[i] for i in order], surface), 8, 1e-8))
+    end = fit.x[len(fit.x) - fit.structure.tail :]
+    return replace(refit(prepared.short, structure, structure.x(pad, [values[i] for i in order], end), 8, 1e-8))
 
 
 def chain(prepared: Prepared, fit: Fit, base: Fit) -> list[Fit]:

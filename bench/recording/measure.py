@@ -22,6 +22,9 @@ from bench.recording.types import Array, Measurement, Recording
 GAP = 5.0
 """A pause between samples of more than so many usual periods is reported."""
 
+FILTERED = 4.0
+"""Samples of a tare that are worth one, at the most: load cells filter."""
+
 UNPAIRED_S = 0.25
 """Forces may outlast the positions by so much before it is reported."""
 
@@ -105,6 +108,7 @@ def measurement_of(recording: Recording) -> Measurement:
         fit_to_s=fit_to,
         marks=list(recording.steps),
         surface_std_mm=recording.surface_std_mm,
+        zero_std_N=_zero_std_N(recording),
         notes=notes,
         doubtful=doubtful,
         stamp_std_s=stamp_std,
@@ -160,6 +164,17 @@ def _forces(recording: Recording, delays: Delays, notes: list[str]) -> tuple[Arr
         notes.append(f"{bad} force samples that the device called bad (overload) left out")
     good = ~flagged
     return _channel("force", cell.time_s[good] - delays.force_s, cell.force_N[good], notes)
+
+
+def _zero_std_N(recording: Recording) -> float:
+    """Standard deviation of the tare: its noise over its samples, which a device's filter makes fewer."""
+    taken = [event for event in recording.events if event.name == "tare"]
+    if not taken:
+        return 0.0
+    sigma, samples = taken[-1].data.get("sigma_N"), taken[-1].data.get("samples")
+    if not isinstance(sigma, int | float) or not isinstance(samples, int | float) or samples < 1 or sigma < 0:
+        return 0.0
+    return float(sigma) * float(np.sqrt(FILTERED / samples))
 
 
 def _span(recording: Recording, place: str) -> tuple[float, float]:

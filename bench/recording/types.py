@@ -130,6 +130,8 @@ class Measurement:
     fit_to_s: float = np.inf
     marks: list[StepMark] = field(default_factory=list)
     surface_std_mm: float = 0.0
+    zero_std_N: float = 0.0
+    """Doubt of the force's zero, as the tare left it."""
     notes: list[str] = field(default_factory=list)
     """What was repaired or left out on reading, in plain words."""
     doubtful: list[tuple[float, float]] = field(default_factory=list)
