@@ -26,7 +26,8 @@ Array = NDArray[np.float64]
 
 CHANNEL = ("outliers", "stuck_samples", "mains_hum")  # found by detectors, not by fitting
 MOST_STARTS = 96
-PERIODS = 22
+PERIODS = 16
+SHORTEST = 0.12  # of the longest period
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_REPORTED = 0.6  # of the travel, for errors of the position: longer ones are another elastic law
@@ -66,8 +67,9 @@ def _narrowed(p: Parameter, reach: Reach, longest: float) -> Parameter:
     elif p.unit == "s" and p.logarithmic:
         upper = min(upper, 3.0 * reach.span_s)
     elif p.name == "period":
-        lower, upper = max(lower, 0.03 * reach.travel_mm), min(upper, longest * reach.travel_mm)
-        starts = tuple((reach.travel_mm / np.linspace(1.04 / longest, 12.0, PERIODS)).tolist())
+        shortest = SHORTEST * longest  # some levels of depth are met by any ripple that is short enough
+        lower, upper = max(lower, shortest * reach.travel_mm), min(upper, longest * reach.travel_mm)
+        starts = tuple((reach.travel_mm / np.linspace(1.04 / longest, 0.96 / shortest, PERIODS)).tolist())
     elif p.name == "reach":
         default = reach.depth_mm
     elif p.name == "limit" and p.unit == "N":

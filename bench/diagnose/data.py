@@ -37,6 +37,8 @@ class Data:
     sigma_N: Array
     """Standard deviation of one force sample there."""
     fold: NDArray[np.intp]
+    tared: Mask | None = None
+    """Entries at which the force was taken for zero (the tare); None: the force's zero is its own."""
 
     @property
     def size(self) -> int:
@@ -63,6 +65,8 @@ class Prepared:
     at: NDArray[np.intp]
     kept: Mask
     """Of the measurement's force samples, those within the time of the positions: they are the ones `at` the grid."""
+    good: Mask
+    """Of those, which are no channel faults."""
     noise: ForceNoise
     hum: Line | None
     """What hums, and has been taken out of the force."""
@@ -123,7 +127,9 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     force[where] = m.force_N
     position = np.interp(grid, time, position)
     depth = max(float(position.max()), 1e-3)
-    full = Data(grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))))
+    full = Data(
+        grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))), _tared(m, grid)
+    )
     owner = _blocks(
         full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(motion.std_mm, 0.9))
     )
@@ -134,6 +140,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
         owner=owner,
         at=where,
         kept=inside,
+        good=good,
         noise=replace(noise, force_N=sigma_force),
         hum=line,
         position_noise_mm=motion.noise_mm,
@@ -143,6 +150,13 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
         depth_mm=depth,
         force_scale_N=max(float(np.abs(m.force_N[counted]).max()), 1e-6),
     )
+
+
+def _tared(m: Measurement, grid: Array) -> Mask | None:
+    if m.tared_s is None:
+        return None
+    inside = (grid >= m.tared_s[0]) & (grid <= m.tared_s[1])
+    return inside if inside.any() else None
 
 
 def _folds(position: Array, weight: Array, travel_mm: float) -> NDArray[np.intp]:
@@ -180,9 +194,9 @@ def _grouped(full: Data, stiffness: float, step_N: float, rate: float, jump_mm: 
     corner = np.flatnonzero(turns)
     index = np.arange(full.size)
     since = index - corner[np.searchsorted(corner, index, side="right") - 1]
-    return _cut(
-        np.cumsum(np.abs(step)), since.astype(np.float64), reach, rate, full.fold, (full.weight > 0).astype(np.int64)
-    )
+    # history is kept apart from what counts; positions between two forces are not
+    counting = (index >= int(np.argmax(full.weight > 0))).astype(np.int64)
+    return _cut(np.cumsum(np.abs(step)), since.astype(np.float64), reach, rate, full.fold, counting)
 
 
 @compiled("int64[::1](float64[::1], float64[::1], float64, float64, int64[::1], int64[::1])")
@@ -219,7 +233,13 @@ def _averaged(full: Data, owner: NDArray[np.intp]) -> Data:
     with np.errstate(invalid="ignore", divide="ignore"):
         force = np.where(weight > 0, np.bincount(owner, full.weight * full.force_N) / weight, 0.0)
         sigma = np.where(weight > 0, np.sqrt(weight / inverse), full.sigma_N.max())
-    time = np.bincount(owner, full.time_s) / count
-    position = np.bincount(owner, full.position_mm) / count
+    # a block with forces stands at their mean time, one without at the mean of its positions
+    share = np.where(weight[owner] > 0, full.weight, 1.0)
+    shares = np.where(weight > 0, weight, count)
+    time = np.bincount(owner, share * full.time_s) / shares
+    position = np.bincount(owner, share * full.position_mm) / shares
     starts = np.flatnonzero(np.diff(owner, prepend=-1))
-    return Data(time, position, force, weight, sigma, full.fold[starts])
+    tared = None if full.tared is None else full.tared[starts]
+    return Data(
+        time, position, force, weight, sigma, full.fold[starts], tared if tared is not None and tared.any() else None
+    )

@@ -30,7 +30,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 TOLD = 0.002  # of the noise power
-LEAST = 0.004  # of the error beyond the noise: what a cause must take of the data held out
+LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and a further cause must take of what was
+# held out
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 RIVALS = 4  # models of the best single causes that are kept
 
@@ -58,12 +59,20 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     fits = chain(prepared, final, base)
     floor = _floor(prepared, final)
     squares, excess = excesses(prepared, fits, floor)
-    while len(fits) > 1 and excess[-2] - excess[-1] <= LEAST * excess[0]:  # it predicts nothing that was held out
+    apart = _flagged_square(prepared, fits[0])
+    while len(fits) > 1 and excess[-2] - excess[-1] <= (LEAST if len(fits) == 2 else FURTHER) * (excess[0] + apart):
         fits, squares, excess = fits[:-1], squares[:-1], excess[:-1]
     if len(fits) == 1:
         squares, excess = excesses(prepared, fits, floor)
     whole = _whole(prepared, fits)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
+
+
+def _flagged_square(prepared: Prepared, fit: Fit) -> float:
+    """Mean square that samples left out add to the error of a fit, N²."""
+    full, at = prepared.full, prepared.at
+    error = (full.force_N - force_at(full, fit.structure, fit.x))[at]
+    return float(np.sum(error[full.weight[at] == 0.0] ** 2)) / max(len(at), 1) if (~prepared.good).any() else 0.0
 
 
 def _floor(prepared: Prepared, final: Fit) -> float:
@@ -146,7 +155,7 @@ def _concluded(
     if scale <= 0:
         scale = np.inf
     gains = [max(a - b, 0.0) / scale for a, b in zip(excess, excess[1:], strict=False)]
-    causes = found(search, path, fits, whole[1], gains)
+    causes = found(search, path, whole[1], gains)
     causes += [replace(c, gain=c.gain / scale) for c in channel]
     left = 1.0 - sum(c.gain for c in causes)
     residual = raw.force_N - after

@@ -54,7 +54,8 @@ def force_at(data: Data, structure: Structure, x: Array) -> Array:
     """Simulated force on the grid (n,), N; not finite where the numbers make no plant."""
     position = data.position_mm + structure.surface_mm(x)
     with np.errstate(all="ignore"):
-        return structure.cascade(x).simulate(data.time_s, position) + structure.offset_N(x)
+        force = structure.cascade(x).simulate(data.time_s, position) + structure.offset_N(x)
+    return force if data.tared is None else force - float(np.mean(force[data.tared]))
 
 
 def errors(data: Data, structure: Structure, x: Array) -> Array:

@@ -6,6 +6,7 @@ best few, all on the short stand-in; what is compared at last has converged.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -30,6 +31,7 @@ WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
+LONGEST_S = 60.0  # after which no further cause is looked for
 MOST_CAUSES = 3
 
 
@@ -200,7 +202,11 @@ class Search:
 
     def _trial(self, fit: Fit) -> Trial:
         cause = fit.structure.causes[-1]
+        at = fit.structure.of_cause(len(fit.structure.causes) - 1)
+        x, lower, upper = fit.x[at], fit.structure.lower[at], fit.structure.upper[at]
+        edge = float(np.sum((x <= lower + 1e-9) | (x >= upper - 1e-9)))  # a shape at its bound is another one's limit
         unusual = 0.0 if cause.form.name == cause.effect.forms[0].name else LATER * self.prepared.colour.memory
+        unusual += edge * LATER * self.prepared.colour.memory
         return Trial(cause, fit, fit.chi2 + self._penalty(fit) + unusual)
 
     def _penalty(self, fit: Fit) -> float:
@@ -215,7 +221,8 @@ class Search:
         """Causes one after the other while each pays; then those that others have made needless go."""
         path = Path([base])
         recurved = False
-        while len(path.fits) <= MOST_CAUSES:
+        begun = time.perf_counter()
+        while len(path.fits) <= MOST_CAUSES and time.perf_counter() - begun < LONGEST_S:
             every = [t for t in self.ranked(path.fits[-1]) if believable(t.fit, self.prepared)]
             present = {c.id for c in path.fits[-1].structure.causes}
             ranked = [t for t in every if t.id not in present]
@@ -238,7 +245,7 @@ class Search:
             if not found.pays or now.chi2 - reshaped > SAME * gained:
                 break
             path.fits.append(best.fit)
-            if len(path.fits) > 2:
+            if len(path.fits) > 2 and best.fit.chi2 > 1.05 * self.samples:
                 path.fits[-1] = self.exchanged(path)
         return path
 
@@ -279,8 +286,10 @@ class Search:
         best = path.fits[-1]
         score = best.chi2 + self._penalty(best)
         own = len(self.believed.causes)
-        for index in range(own, len(best.structure.causes) - 1):
-            rivals = [t.id for t in path.rivals[index - own][:5]] + [t.id for t in path.rivals[-1][:4]]
+        for index in range(own, len(best.structure.causes)):
+            rivals = [t.id for t in path.rivals[min(index - own, len(path.rivals) - 1)][:5]] + [
+                t.id for t in path.rivals[-1][:4]
+            ]
             present = {c.id for c in best.structure.causes}
             rivals = [r for r in dict.fromkeys(rivals) if r not in present]
             if not rivals:

@@ -58,21 +58,15 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
     return squares, out
 
 
-def rivals_of(search: Search, path: Path, fits: Sequence[Fit], index: int) -> list[Trial]:
-    """What stood beside a cause: other causes in its place, all the others kept, each at its best."""
-    final = fits[-1]
-    own = len(search.believed.causes)
-    if len(final.structure.causes) == own + 1 and path.rivals:
-        chosen = final.structure.causes[own].id
-        return [t for t in path.rivals[0] if t.id != chosen]
-    structure, x = reduced(final, own + index)
-    without = refit(search.short, structure, x, 20, 1e-6)
-    present = {c.id for c in final.structure.causes}
-    near: list[str] = []
-    for ranked in path.rivals:
-        near += [t.id for t in ranked[:5]]
-    ids = [i for i in dict.fromkeys(near) if i not in present]
-    return search.ranked(without, only=ids) if ids else []
+def stage_of(path: Path, id_: str) -> tuple[Trial | None, list[Trial], float]:
+    """Where a cause came in: (itself joined there, what stood beside it, χ² before)."""
+    stages = list(zip(path.fits, path.rivals, strict=False))
+    for first in (True, False):
+        for before, ranked in stages:
+            own = [t for t in ranked if t.id == id_]
+            if own and (not first or ranked[0].id == id_):
+                return own[0], [t for t in ranked if t.id != id_], before.chi2
+    return None, [], 0.0
 
 
 def alternatives(
@@ -124,16 +118,15 @@ def described(fit: Fit, index: int, inflation: float) -> tuple[str, str, dict[st
     return cause.id, cause.form.name, out
 
 
-def found(search: Search, path: Path, fits: Sequence[Fit], final: Fit, gains: Sequence[float]) -> list[CauseFound]:
+def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> list[CauseFound]:
     """The causes as the result has them. `final`: polished on all the data."""
     own = len(search.believed.causes)
     out = []
     n = max(search.samples - final.free, 1.0)
     overall = max(final.chi2 / n, 1.0)
     for k, gain in enumerate(gains):
-        structure, x = reduced(fits[-1], own + k)
-        without = refit(search.short, structure, x, 20, 1e-6) if len(gains) > 1 else fits[0]
-        others, confidence = alternatives(search, fits[-1], without.chi2, rivals_of(search, path, fits, k))
+        own_trial, rivals, before = stage_of(path, final.structure.causes[own + k].id)
+        others, confidence = alternatives(search, own_trial.fit, before, rivals) if own_trial else ([], 0.5)
         id_, form, numbers = described(final, own + k, overall * search.prepared.colour.memory**0.5)
         effect = final.structure.causes[own + k].effect
         values = {name: number.value for name, number in numbers.items()}

@@ -25,6 +25,9 @@ GAP = 5.0
 FILTERED = 4.0
 """Samples of a tare that are worth one, at the most: load cells filter."""
 
+TARED_S = 0.9
+"""The tare averages at least so long before it is noted."""
+
 UNPAIRED_S = 0.25
 """Forces may outlast the positions by so much before it is reported."""
 
@@ -109,6 +112,7 @@ def measurement_of(recording: Recording) -> Measurement:
         marks=list(recording.steps),
         surface_std_mm=recording.surface_std_mm,
         zero_std_N=_zero_std_N(recording),
+        tared_s=_tared_s(recording),
         notes=notes,
         doubtful=doubtful,
         stamp_std_s=stamp_std,
@@ -175,6 +179,12 @@ def _zero_std_N(recording: Recording) -> float:
     if not isinstance(sigma, int | float) or not isinstance(samples, int | float) or samples < 1 or sigma < 0:
         return 0.0
     return float(sigma) * float(np.sqrt(FILTERED / samples))
+
+
+def _tared_s(recording: Recording) -> tuple[float, float] | None:
+    """The time of the samples that the tare averaged: those before its event."""
+    taken = [event.time_s for event in recording.events if event.name == "tare"]
+    return (taken[-1] - TARED_S, taken[-1]) if taken else None
 
 
 def _span(recording: Recording, place: str) -> tuple[float, float]:

@@ -132,6 +132,8 @@ class Measurement:
     surface_std_mm: float = 0.0
     zero_std_N: float = 0.0
     """Doubt of the force's zero, as the tare left it."""
+    tared_s: tuple[float, float] | None = None
+    """Between which times the force was taken for zero: what a model says of them counts as zero too."""
     notes: list[str] = field(default_factory=list)
     """What was repaired or left out on reading, in plain words."""
     doubtful: list[tuple[float, float]] = field(default_factory=list)
