@@ -2,22 +2,29 @@
 
 Touch-off finds the surface to some micrometres. A fit moves it within that doubt, and the number belongs to the run and
 not to the model; so whoever compares a model with a run finds it again, for this model and this run.
+
+Reported positions are noisy, and coarse in fast moves. A diagnosis runs its models on the motion as the pad felt it
+(`bench.felt_motion`), a fit on the positions as they are. Both ways are tried, and the motion as felt counts where it
+serves the model clearly better.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from bench.errors import InputError
+from bench.felt_motion import felt
 from bench.recording.types import Measurement
 from sim.model import Model
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 FARTHEST = 6.0
 """Standard deviations that a surface may be moved; as many as in a fit (`identify.surface`)."""
@@ -25,29 +32,48 @@ FARTHEST = 6.0
 CLOSE = 1e-4
 """Standard deviations to which the best place is found."""
 
+CLEARLY = 0.005
+"""Share of the error by which the motion as felt must be better than the positions as they are."""
+
 
 @dataclass(frozen=True)
 class Likeness:
     """A model's force over a measurement's motion: `force_N` (m,) at its force stamps, all of them.
 
-    `moved_mm`: depth added to the positions, 0 where the surface is certain; `rmse_N`: over the samples that count.
+    `moved_mm`: depth added to the positions, 0 where the surface is certain. `flagged` (m,): samples that a fault of
+    the force channel has made, as a diagnosis flags them. `rmse_N`: over the samples that count and are not flagged;
+    `rmse_with_flagged_N`: over all that count. `rmse_as_reported_N`: as `rmse_N`, on the positions as they are.
     """
 
     measurement: Measurement
     force_N: Array
     moved_mm: float
     rmse_N: float
+    rmse_with_flagged_N: float
+    flagged: Mask
+    rmse_as_reported_N: float = math.nan
 
     @property
     def sentence(self) -> str:
-        """What was done to the surface, for people; empty where nothing was."""
-        if self.measurement.surface_std_mm <= 0:
-            return ""
-        way = "lower" if self.moved_mm < 0 else "higher"
-        return (
-            f"surface taken {1e3 * abs(self.moved_mm):.2g} µm {way} than touch-off said "
-            f"(its own doubt: {1e3 * self.measurement.surface_std_mm:.2g} µm)"
-        )
+        """What was left out, and what was done to the surface, for people; empty where nothing was."""
+        said = []
+        if self.rmse_as_reported_N > self.rmse_N:
+            said.append(
+                f"the motion taken as the pad felt it ({self.rmse_as_reported_N:.6g} N on the positions as reported)"
+            )
+        left_out = int(np.count_nonzero(self.flagged & self.measurement.counted()))
+        if left_out:
+            several = "samples" if left_out > 1 else "sample"
+            said.append(
+                f"{left_out} {several} left out that the channel spoiled ({self.rmse_with_flagged_N:.6g} N with them)"
+            )
+        if self.measurement.surface_std_mm > 0:
+            way = "lower" if self.moved_mm < 0 else "higher"
+            said.append(
+                f"surface taken {1e3 * abs(self.moved_mm):.2g} µm {way} than touch-off said "
+                f"(its own doubt: {1e3 * self.measurement.surface_std_mm:.2g} µm)"
+            )
+        return "; ".join(said)
 
 
 def likeness(model: Model, measurement: Measurement) -> Likeness:
@@ -56,12 +82,31 @@ def likeness(model: Model, measurement: Measurement) -> Likeness:
     Where touch-off stated a doubt, the surface is moved: the shift s with the least Σ e² + V (s/std)², V being the mean
     square error at the best s without that prior. Positions whose surface is certain (CSV) are taken as they are.
     """
-    counted = measurement.counted()
+    flagged = _spoiled(measurement)
+    found = [_along(model, measurement, *path, flagged) for path in _paths(measurement)]
+    best = found[-1] if found[-1].rmse_N < (1.0 - CLEARLY) * found[0].rmse_N else found[0]
+    flagged = _spoiled_beside(measurement, best.force_N, best.rmse_N, flagged)
+    judged = _of(measurement, best.force_N, best.moved_mm, flagged)
+    if best is found[0]:
+        return judged
+    as_reported = _of(measurement, found[0].force_N, found[0].moved_mm, flagged)
+    return replace(judged, rmse_as_reported_N=as_reported.rmse_N)
+
+
+def _paths(measurement: Measurement) -> Iterator[tuple[Array, Array]]:
+    yield measurement.position_time_s, measurement.position_mm
+    motion = felt(measurement.position_time_s, measurement.position_mm)
+    if not np.array_equal(motion.position_mm, measurement.position_mm):
+        yield motion.time_s, motion.position_mm
+
+
+def _along(model: Model, measurement: Measurement, time_s: Array, position_mm: Array, flagged: Mask) -> Likeness:
+    """On one path, the surface where it serves the model best."""
+    counted = measurement.counted() & ~flagged
     measured = measurement.force_N[counted]
 
     def force(moved_mm: float) -> Array:
-        moved = measurement.position_mm + moved_mm
-        return model.simulate_at(measurement.position_time_s, moved, measurement.force_time_s)
+        return model.simulate_at(time_s, position_mm + moved_mm, measurement.force_time_s)
 
     def square(moved_mm: float) -> float:
         return float(np.sum((measured - force(moved_mm)[counted]) ** 2))
@@ -72,10 +117,42 @@ def likeness(model: Model, measurement: Measurement) -> Likeness:
         moved_mm = _least(square, std)
         V = square(moved_mm) / measured.size
         moved_mm = _least(lambda s: square(s) + V * (s / std) ** 2, std)
-    simulated = force(moved_mm)
-    error = measured - simulated[counted]
-    rmse = math.sqrt(float(np.mean(error**2))) if error.size else math.nan
-    return Likeness(measurement, simulated, moved_mm, rmse)
+    return _of(measurement, force(moved_mm), moved_mm, flagged)
+
+
+def _of(measurement: Measurement, simulated_N: Array, moved_mm: float, flagged: Mask) -> Likeness:
+    counted = measurement.counted()
+    error = measurement.force_N - simulated_N
+    rmse, with_flagged = _rms(error[counted & ~flagged]), _rms(error[counted])
+    return Likeness(measurement, simulated_N, moved_mm, rmse, with_flagged, flagged)
+
+
+def _rms(error: Array) -> float:
+    return math.sqrt(float(np.mean(error**2))) if error.size else math.nan
+
+
+def _spoiled(measurement: Measurement) -> Mask:
+    """Samples (m,) that show by themselves that the channel made them."""
+    from bench.diagnose.channel import faults
+
+    return ~faults(measurement.force_N).good
+
+
+def _spoiled_beside(measurement: Measurement, simulated_N: Array, rmse_N: float, flagged: Mask) -> Mask:
+    """The same, stray samples judged against the model where it is right enough, as in a diagnosis."""
+    from bench.diagnose.channel import faults, standing_off
+    from bench.diagnose.data import prepare
+    from bench.diagnose.diagnose import NEAR
+
+    try:
+        noise_N = prepare(measurement, ~flagged).floor_N
+    except InputError:
+        return flagged  # too few samples to tell
+    if not rmse_N <= NEAR * noise_N:
+        return flagged
+    alone = faults(measurement.force_N)
+    faulty = alone.saturated | alone.stuck
+    return faulty | standing_off(measurement.force_N - simulated_N, ~faulty)
 
 
 def _least(cost: Callable[[float], float], std_mm: float) -> float:

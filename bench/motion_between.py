@@ -13,6 +13,7 @@ Measured samples stay as they are: the curve is bent to go through each of them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -136,13 +137,21 @@ def _trapezoids(
         # A move that is no trapezoid at any acceleration must not decide for the others.
         # Two samples inside a move are met by any acceleration above the true one: the least one counts.
         least = GENTLE * np.count_nonzero(told) * np.log(acceleration)
-        return float(np.sum(np.minimum(fitted[2] * scale, 25.0 * moves.count)) + least), fitted
+        return float(np.sum(moves.count * np.log1p(fitted[2] * scale / np.maximum(moves.count, 1))) + least), fitted
 
     scanned = [misfit(a * reach)[0] for a in SCAN]
     best = int(np.argmin(scanned))
     low, high = np.log(SCAN[max(best - 1, 0)] * reach), np.log(SCAN[min(best + 1, len(SCAN) - 1)] * reach)
     acceleration = _golden(lambda g: misfit(float(np.exp(g)))[0], float(low), float(high))
     _, (middle, speed, squares) = misfit(acceleration)
+    observed = moves.speed
+    for factor in (0.8, 1.3):  # a search that ended beside a corner is begun again on its other side
+        moves.speed = factor * observed
+        again = _fitted(moves, acceleration)
+        better = again[2] < squares
+        middle, speed, squares = (
+            np.where(better, new, old) for new, old in zip(again, (middle, speed, squares), strict=True)
+        )
     lone = moves.count == 1
     cruised = told & (speed < 0.97 * np.sqrt(acceleration * moves.way))
     if lone.any():  # one sample inside tells when, not how fast: as the others
@@ -232,7 +241,7 @@ def _fitted(
         H11, H22 = np.sum(by_middle**2, axis=1), np.sum(by_speed**2, axis=1)
         H12 = np.sum(by_middle * by_speed, axis=1)
         g1, g2 = np.sum(by_middle * error, axis=1), np.sum(by_speed * error, axis=1)
-        held = kept | ((speed >= fastest) & (g2 > 0)) | (H22 <= 1e-12 * np.max(H22, initial=1e-300))
+        held = kept | ((speed >= fastest) & (g2 > 0)) | (1e-12 * np.max(H22, initial=1e-300) >= H22)
         H12, g2 = np.where(held, 0.0, H12), np.where(held, 0.0, g2)
         H11, H22 = H11 * (1 + damping) + 1e-300, np.where(held, 1.0, H22 * (1 + damping)) + 1e-300
         whole = H11 * H22 - H12**2 + 1e-300
@@ -245,8 +254,7 @@ def _fitted(
         middle = np.where(better, tried_middle, middle)
         speed = np.where(better & ~held, tried_speed, speed)
         error, by_middle, by_speed = (
-            np.where(better[:, None], new, old)
-            for new, old in zip(tried, (error, by_middle, by_speed), strict=True)
+            np.where(better[:, None], new, old) for new, old in zip(tried, (error, by_middle, by_speed), strict=True)
         )
         squares = np.where(better, now, squares)
         if not better.any():
@@ -254,7 +262,8 @@ def _fitted(
     return middle, speed, squares
 
 
-def _golden(f, low: float, high: float) -> float:  # type: ignore[no-untyped-def]
+def _golden(f: Callable[[float], float], low: float, high: float) -> float:
+    """exp of where a function of one minimum is least, by golden section."""
     ratio = (np.sqrt(5) - 1) / 2
     a, b = low, high
     c, d = b - ratio * (b - a), a + ratio * (b - a)
@@ -278,6 +287,7 @@ def _cut(
     time = t[first : last + 1]
     h, steps = np.diff(time), np.abs(np.diff(x[first : last + 1]))
     corners = np.zeros(0)
+    position: Callable[[Array], Array]
     if trapezoid is not None:
         position = trapezoid.position
         corners = trapezoid.corners_s()
@@ -301,8 +311,10 @@ def _cut(
     return fresh, np.asarray(position(fresh) + np.interp(fresh, time, miss))
 
 
-def _cubic(t: Array, x: Array, first: int, last: int):  # type: ignore[no-untyped-def]
+def _cubic(t: Array, x: Array, first: int, last: int) -> Callable[[Array], Array]:
+    """A smooth curve through the samples of a group and some beside it."""
     from scipy.interpolate import Akima1DInterpolator
 
     a, b = max(first - 3, 0), min(last + 4, len(t))
-    return Akima1DInterpolator(t[a:b], x[a:b], method="makima")
+    curve: Callable[[Array], Array] = Akima1DInterpolator(t[a:b], x[a:b], method="makima")
+    return curve

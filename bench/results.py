@@ -1,9 +1,10 @@
-"""What is made of a recording: the fit, its files, the report. Used after every run, and by `padbench report`."""
+"""What is made of a recording: fit, diagnosis, files, report. Used after every run, and by `padbench report`."""
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,48 +12,78 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bench import identify
-from bench.errors import InputError
+from bench.diagnose import diagnose
+from bench.diagnose.next_test import bench_in, design
+from bench.diagnose.words import lines as diagnosis_lines
+from bench.errors import InputError, PadbenchError
 from bench.fitview import fit_view
 from bench.modelfile import write_model
 from bench.recording import Recording, read_recording
-from bench.recording.schemas import NO_SURFACE
+from bench.recording.schemas import BENCH_FILE, NO_SURFACE
 from bench.report import Plan as PlannedCurve
 from bench.report import write_report
 from bench.run.folder import FIT, MODEL, REPORT
+from sim.model import Model
 
 if TYPE_CHECKING:
+    from bench.diagnose import Diagnosis
     from bench.identify import FitResult
     from bench.predict import Prediction
 
 
+DIAGNOSIS = "diagnosis.json"
+
+NO_PAD = {"pad": {"elastic": {"law": "none"}}}
+"""The model of a bench in free air."""
+
+
 @dataclass(frozen=True)
 class Results:
-    """The files beside a recording; `fit` is None where there is none, and `problem` says why."""
+    """The files beside a recording; `fit` is None where there is none, and `problem` says why; likewise `diagnosis`."""
 
     folder: Path
     fit: FitResult | None
     problem: str
     report: Path
+    diagnosis: Diagnosis | None = None
+    diagnosis_problem: str = ""
 
     def lines(self) -> list[str]:
         """A few lines for a terminal."""
-        if self.fit is None:
-            return [f"no fit: {self.problem}"] if self.problem else []
-        return fit_lines(self.fit)
+        lines = [f"no fit: {self.problem}"] if self.problem else []
+        if self.fit is not None:
+            lines = fit_lines(self.fit)
+        if self.diagnosis is not None:
+            first, *others = diagnosis_lines(self.diagnosis)
+            return [*lines, f"diagnosis: {first}", *others]
+        return [*lines, f"no diagnosis: {self.diagnosis_problem}"] if self.diagnosis_problem else lines
 
 
-def analyse(folder: Path, *, prediction: Prediction | None = None) -> Results:
-    """Fit the recording of a run folder, and write model.yaml, fit.json and report.html beside it.
+def analyse(
+    folder: Path,
+    *,
+    prediction: Prediction | None = None,
+    believed: Model | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Results:
+    """Fit and diagnose the recording of a run folder; write model.yaml, fit.json, diagnosis.json and report.html.
 
-    What cannot be fitted (an air run, a run stopped before the pad) is said in the report. Raises `InputError` where
+    Diagnosed is `believed`, or else the fit; a run in air tells of the bench alone. What cannot be fitted (an air run,
+    a run stopped before the pad) is said in the report, and so is what cannot be diagnosed. Raises `InputError` where
     the recording cannot be read.
     """
+    tell = progress or (lambda _: None)
     recording = read_recording(folder)
     fit, problem = _fit_of(recording)
     if fit is not None:
         (folder / FIT).write_text(json.dumps(fit.to_json(), indent=2) + "\n", "utf-8")
         write_model(folder / MODEL, fit.model)
+    diagnosis, unclear = _diagnosis_of(recording, fit, believed, tell)
+    if diagnosis is not None:
+        text = json.dumps(diagnosis.to_json(), indent=2, allow_nan=False)
+        (folder / DIAGNOSIS).write_text(text + "\n", "utf-8")
     report = folder / REPORT
+    tell("writing the report")
     write_report(
         report,
         recording,
@@ -60,8 +91,10 @@ def analyse(folder: Path, *, prediction: Prediction | None = None) -> Results:
         plan=_planned(recording, prediction),
         fit_problem=problem,
         host=recording.host,
+        diagnosis=diagnosis,
+        diagnosis_problem=unclear,
     )
-    return Results(folder, fit, problem, report)
+    return Results(folder, fit, problem, report, diagnosis, unclear)
 
 
 def fit_lines(fit: FitResult) -> list[str]:
@@ -98,6 +131,32 @@ def _fit_of(recording: Recording) -> tuple[FitResult | None, str]:
         return identify.fit(recording.measurement()), ""
     except InputError as error:
         return None, error.message
+
+
+def _diagnosis_of(
+    recording: Recording, fit: FitResult | None, believed: Model | None, tell: Callable[[str], None]
+) -> tuple[Diagnosis | None, str]:
+    """(the diagnosis, or None; why there is none). No failure of it may take away a run and its fit."""
+    in_air = is_air_run(recording)
+    model = Model.from_dict(NO_PAD) if in_air else believed or (fit.model if fit is not None else None)
+    if model is None or (not in_air and recording.surface_mm is None):
+        return None, ""  # that nothing was fitted is said already
+    try:
+        measurement = recording.measurement()
+        found = diagnose(measurement, model, lambda what: tell(f"diagnosing: {what}"))
+        json.dumps(found.to_json(), allow_nan=False)
+    except PadbenchError as error:
+        return None, str(error)
+    except Exception as error:  # whatever it is: the run is over, and its data and fit are worth more
+        return None, f"this is a defect of padbench, not of your run: {type(error).__name__}: {error}"
+    tell("designing the next test")
+    try:
+        found.next_protocol = design(
+            found, measurement, bench_in(recording.attachments.get(BENCH_FILE), recording.source)
+        )
+    except Exception as error:  # likewise
+        found.notes.append(f"no next test could be designed: {type(error).__name__}: {error}")
+    return found, ""
 
 
 def _planned(recording: Recording, prediction: Prediction | None) -> PlannedCurve | None:

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from bench.commands.options import add_columns, must_be_writable, read_data, status
-from bench.errors import EXIT_DONE
+from bench.errors import EXIT_DONE, InputError
+
+if TYPE_CHECKING:
+    from bench.diagnose import Diagnosis
+    from bench.recording import Recording
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,13 +32,19 @@ def main(args: argparse.Namespace) -> int:
     from bench.config import load_model
     from bench.diagnose import diagnose
     from bench.diagnose.words import lines
+    from bench.results import is_air_run
 
     for path in (args.json, args.write, args.report, args.next):
         must_be_writable(path)
     model = load_model(args.model)
-    measurement = read_data(args, args.data)[0].measurement()
+    recording = read_data(args, args.data)[0]
+    if is_air_run(recording) and model.pad.elastic.law != "none":
+        cure = "name a model with `elastic: {law: none}`: it tells of the bench alone"
+        raise InputError(str(args.data), f"was recorded in air: {args.model} has nothing to press there", cure)
+    measurement = recording.measurement()
     with status("diagnosing", quiet=args.json == "-") as progress:
         result = diagnose(measurement, model, progress)
+        result.next_protocol = _next(result, recording, progress)
     text = json.dumps(result.to_json(), indent=2, allow_nan=False)
     if args.json == "-":
         print(text)
@@ -44,4 +56,30 @@ def main(args: argparse.Namespace) -> int:
         from bench.modelfile import write_model
 
         write_model(args.write, result.model)
+    if args.next:
+        _write_next(args.next, result, quiet=args.json == "-")
+    if args.report:
+        from bench.report.diagnosis import write_diagnosis
+
+        write_diagnosis(args.report, result)
     return EXIT_DONE
+
+
+def _next(result: Diagnosis, recording: Recording, progress: Callable[[str], None]) -> dict[str, Any] | None:
+    """The protocol that tells rivals apart, where there are any."""
+    from bench.diagnose.next_test import bench_in, design
+    from bench.recording.schemas import BENCH_FILE
+
+    progress("designing the next test")
+    bench = bench_in(recording.attachments.get(BENCH_FILE), recording.source)
+    return design(result, recording.measurement(), bench)
+
+
+def _write_next(path: Path, result: Diagnosis, *, quiet: bool) -> None:
+    """Write the next protocol; where there is none, say so and write nothing."""
+    if result.next_protocol is not None:
+        from bench.diagnose.next_test import write_protocol
+
+        write_protocol(path, result.next_protocol)
+    elif not quiet:
+        print(f"no next test is needed, and {path} was not written: no two causes remain that a test could tell apart")

@@ -15,15 +15,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Write model.yaml, fit.json and report.html of a run folder."""
+    """Write model.yaml, fit.json, diagnosis.json and report.html of a run folder."""
     from bench.results import analyse
 
     if args.run.is_file():
         raise InputError(
             str(args.run), "is not a run folder", "for a single file use `padbench fit FILE --report HTML`"
         )
-    with status("fitting the pad's model"):
-        results = analyse(args.run)
+    with status("fitting the pad's model") as progress:
+        results = analyse(args.run, progress=progress)
     print("\n".join(results.lines()))
     print(f"report: {results.report}")
     return EXIT_DONE

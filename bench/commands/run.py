@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from bench.config import Bench
     from bench.predict import Prediction
     from bench.run.runner import Outcome
+    from sim.model import Model
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,15 +74,15 @@ def main(args: argparse.Namespace) -> int:
         discard(folder)  # no device has been reached: nothing was measured, and the same command may be given again
         raise
     _say_outcome(outcome, bench, time.perf_counter() - started)
-    _after(outcome, preflight.prediction)
+    _after(outcome, preflight.prediction, believed)
     return EXIT_DONE if outcome.cause is None else EXIT_NO
 
 
-def _after(outcome: Outcome, prediction: Prediction) -> None:
+def _after(outcome: Outcome, prediction: Prediction, believed: Model | None) -> None:
     from bench.results import analyse
 
-    with status("fitting the pad's model"):
-        results = analyse(outcome.folder, prediction=prediction)
+    with status("fitting the pad's model") as progress:
+        results = analyse(outcome.folder, prediction=prediction, believed=believed, progress=progress)
     for line in results.lines():
         say(line)
     say(f"report: {results.report}")

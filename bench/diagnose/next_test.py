@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 
 from bench.recording.types import Measurement
-from sim.model import Model
+from sim.model import EffectEntry, Model
 
 from .data import Data
 from .numbers import PadNumbers, Structure, cause_of
@@ -33,12 +33,14 @@ ENOUGH = 200.0
 """Expected Δχ² with which a test is content: far beyond chance, and beyond some error in the shapes …"""
 SHARE = 0.06
 """… and the share of the cause's own χ² that the other must be unable to take: no shape is exact."""
-WORTH = 0.25
+WORTH = 0.1
 """Part of both under which no test is proposed."""
 LONGEST_S = 150.0
 MOST_BLOCKS = 6
 FASTEST_Hz = 500.0
 """Samples per second that are simulated at the most."""
+SETTLED = 0.01
+"""Part of what is worth while under which no other form of the rival need be tried."""
 STEPS = 40
 STRONGER = 1.5
 """Times the greatest force of the data that a test may expect: a fast way to the same depth is felt more."""
@@ -75,7 +77,7 @@ def design(d: Diagnosis, measurement: Measurement, bench: Bench | None = None) -
     chosen, told = _chosen(blocks, pair, reach, sigma, rate)
     if not chosen or told < WORTH:
         return None
-    return _protocol(pair, chosen, reach, rate, bench)
+    return _protocol(pair, chosen, told, reach, rate, bench)
 
 
 def rival_of(d: Diagnosis) -> Rival | None:
@@ -162,18 +164,41 @@ def _told(true: Model, other: Model, moved: Motion, sigma_N: float) -> float:
     force = true.simulate(moved.time_s, moved.position_mm)
     sigma, fold = np.full(n, sigma_N), np.zeros(n, dtype=np.intp)
     data = Data(moved.time_s, moved.position_mm, force, moved.weight, sigma, fold)
-    left = _refitted(data, other)
-    if left <= 0.0:
+    left = math.inf
+    for member in family(other):
+        left = min(left, refitted(data, member))
+        if left <= SETTLED * ENOUGH * WORTH:
+            break
+    if left <= 0.0 or not math.isfinite(left):
         return 0.0
-    own = max(_refitted(data, true.model_copy(update={"effects": true.effects[:-1]})), left)
+    without = refitted(data, true.model_copy(update={"effects": true.effects[:-1]}))
+    own = max(without, left) if math.isfinite(without) else math.inf
     return min(left / ENOUGH, left / own / SHARE)
 
 
-def _refitted(data: Data, model: Model) -> float:
+def family(model: Model) -> list[Model]:
+    """The model, and the same with its last effect in the other forms that a diagnosis tries: their numbers where they
+    share them, else as usual. Any of them may pass for the other cause."""
+    if not model.effects:
+        return [model]
+    own = model.effects[-1]
+    active = own.active()
+    out = [model]
+    for form in active.effect.forms:
+        if form.name == own.form or not form.sought or form.amend is not None or active.form.amend is not None:
+            continue
+        entry: dict[str, Any] = {"id": own.id, "form": form.name}
+        entry |= {p.name: min(max(active.values.get(p.name, p.if_left_out), p.lower), p.upper) for p in form.parameters}
+        effects = [*model.effects[:-1], EffectEntry.model_validate(entry)]
+        out.append(model.model_copy(update={"effects": effects}))
+    return out
+
+
+def refitted(data: Data, model: Model) -> float:
     """χ² that a model leaves when its numbers are refitted."""
     structure = structure_of(model, float(data.position_mm.max()), max(float(np.abs(data.force_N).max()), 1e-6))
     found = refit(data, structure, structure.x(structure.pad.x()), STEPS, 1e-5)
-    return found.chi2 if math.isfinite(found.chi2) else 0.0
+    return found.chi2 if math.isfinite(found.chi2) else math.inf
 
 
 def structure_of(model: Model, depth_mm: float, force_N: float) -> Structure:
@@ -185,16 +210,19 @@ def structure_of(model: Model, depth_mm: float, force_N: float) -> Structure:
     return Structure(PadNumbers(model.pad.physics(), depth_mm, force_N), tuple(causes))
 
 
-def _protocol(pair: Rival, chosen: Sequence[Block], reach: Reach, rate: float, bench: Bench | None) -> dict[str, Any]:
+def _protocol(
+    pair: Rival, chosen: Sequence[Block], told: float, reach: Reach, rate: float, bench: Bench | None
+) -> dict[str, Any]:
     different = {block.name: block for block in chosen}.values()
     what = ", ".join(block.what for block in different)
+    hope = "" if told >= 0.5 else " They differ little: it may not be enough."
     peak = _peak(chosen, pair, reach, rate)
     force = float(math.ceil(1.3 * peak + 0.5))
     if bench is not None:
         force = min(force, bench.limits.force)
     return {
         "name": "next_test",
-        "description": f"Tells {name_of(pair.named)} from {name_of(pair.other)}: {what}.",
+        "description": f"Tells {name_of(pair.named)} from {name_of(pair.other)}: {what}.{hope}",
         "approach": {"speed": min(2.0, reach.speed_mm_s), "force": 0.05, "retract": -AIR_mm},
         "limits": {"force": force, "depth": round(1.03 * reach.depth_mm + 0.05, 2)},
         "steps": [block.to_dict(chosen.count(block)) for block in different],

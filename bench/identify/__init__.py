@@ -39,11 +39,12 @@ def fit(
 ) -> FitResult:
     """Fit one pad model to one or more measurements.
 
-    `law`: exponential (9), power (10), polynomial (14, of `degree`) or auto; `order`: number of relaxation modes r or
-    auto; `contact`: bonded, unilateral or auto. `progress` is called with a few words as the work goes on.
+    `law`: exponential (9), power (10), polynomial (14, of `degree`), spline (points; `continuous` alone) or auto;
+    `order`: number of relaxation modes r or auto; `contact`: bonded, unilateral or auto. `progress` is called with a
+    few words as the work goes on.
     `sample_time`: T in s of a discrete method; None: from the data. `options`: further arguments of the method's own
     `fit` (`starts` of noniterative, `ramps` and `step` of fast). Several measurements are runs of one pad, each from
-    rest. Raises `bench.errors.InputError` for a name that is not
+    rest (`continuous`: unless it begins loaded). Raises `bench.errors.InputError` for a name that is not
     known and for data that cannot be fitted at all (too few samples, no contact, no force, times out of order).
     """
     from importlib import import_module

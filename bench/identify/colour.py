@@ -37,14 +37,15 @@ def plain_colour(errors: list[Array]) -> Colour:
     """Of residuals as they are, one array a run."""
     count = sum(len(e) for e in errors)
     lags = _lags(errors)
-    return _regressed(sum(_raw(e, lags) for e in errors) / max(count, 1), count)
+    raw = np.sum([_raw(e, lags) for e in errors], axis=0)
+    return _regressed(np.asarray(raw / max(count, 1)), count)
 
 
 def corrected_colour(errors: list[Array], sensitivity: list[Array], inverse: Array) -> Colour:
     """Of the noise behind residuals of a fit: `sensitivity` J (n, P) of each run, `inverse` H⁻¹ (P, P)."""
     count = sum(len(e) for e in errors)
     lags = _lags(errors)
-    raw = np.asarray(sum(_raw(e, lags) for e in errors))
+    raw = np.asarray(np.sum([_raw(e, lags) for e in errors], axis=0))
     colour = _regressed(raw / count, count)
     if colour.gamma[0] <= 0:
         return colour
@@ -128,4 +129,4 @@ def _filtered(J: Array, gamma: Array) -> Array:
 
 def spread_through(sensitivity: list[Array], gamma: Array) -> Array:
     """Σ_kl γ(k−l) J_k J_lᵀ over all runs, (P, P)."""
-    return np.asarray(sum(J.T @ _filtered(J, gamma) for J in sensitivity))
+    return np.asarray(np.sum([J.T @ _filtered(J, gamma) for J in sensitivity], axis=0))

@@ -9,8 +9,6 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from bench.errors import InputError
 from bench.recording.types import Measurement
 
@@ -25,10 +23,10 @@ from .problem import Problem, build
 from .profile import not_told
 from .result import Evidence, FitResult
 from .select import Choice, choose
-from .unformed import with_points
 from .surface import doubtful, moved_mm, with_surfaces
 from .traces import figures_of, traces_of
 from .uncertainty import spread_of
+from .unformed import with_points
 
 LAWS = ("exponential", "power", "polynomial", "spline")
 ORDERS = (1, 2, 3, 4)
@@ -44,7 +42,7 @@ def fit(
     degree: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> FitResult:
-    """Fit one pad to all measurements; each starts from rest. Raises InputError as `identify.fit` does."""
+    """Fit one pad to all measurements, each from rest unless it begins loaded; raises InputError as `identify.fit`."""
     begun = time.perf_counter()
     families = _families(law, degree)
     orders = _orders(order)
@@ -66,9 +64,7 @@ def fit(
     best = choice.best.estimate
     spread = spread_of(problem, best)
     found, covariance, undetermined = parameters(problem, best, spread)
-    relative = {
-        n: p.std / p.value if p.value else math.nan for n, p in found.items() if n.startswith(("c_", "nu_"))
-    }
+    relative = {n: p.std / p.value if p.value else math.nan for n, p in found.items() if n.startswith(("c_", "nu_"))}
     loose = not_told(problem, best, relative, spread.samples) if best.physical else set()
     loose |= set(undetermined)
     loose |= {"nu" + name[1:] for name in loose if name.startswith("c_")}  # a share that may be nothing has no rate
@@ -76,7 +72,9 @@ def fit(
     traces = traces_of(problem, best)
     samples, V, fit_percent = figures_of(traces)
     structure = best.structure
-    unit, within = problem.force_N**2, problem.scatter / problem.weight
+    unit = problem.force_N**2
+    # Block means of long data leave out the scatter within the blocks, the same for every candidate.
+    within = max(V / unit - choice.best.V, 0.0) if problem.in_blocks else 0.0
     return FitResult(
         method="continuous",
         law=structure.family.name,
@@ -94,7 +92,7 @@ def fit(
         held_out_rmse=math.sqrt((choice.best.held_out_square + within) * unit),
         samples=samples,
         seconds=time.perf_counter() - begun,
-        degree=structure.family.degree or None,
+        degree=structure.family.degree if structure.family.name == "polynomial" else None,
         traces=traces,
         evidence=_evidence(choice, unit, within),
         notes=notes.about_data(problem, noise, structure.unilateral) + notes.about_fit(problem, best),

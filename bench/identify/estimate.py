@@ -32,9 +32,15 @@ class Estimate:
     def distinct(self) -> bool:
         """Whether every mode is there: no share at zero, no two rates the same, none at the edge of what the data see
         (a mode faster than the samples stands for something else: a late force, a viscous part)."""
+        _, rates, _ = self.structure.split(self.x)
+        return self.distinct_but_slow and bool(np.all(rates > 1.001 * self.bounds.slowest))
+
+    @property
+    def distinct_but_slow(self) -> bool:
+        """Whether every mode is there, but for one so slow that the data show only that the force goes on falling."""
         _, rates, weights = self.structure.split(self.x)
         apart = bool(np.all(rates[:-1] >= MERGED * rates[1:]))
-        seen = bool(np.all((rates > 1.001 * self.bounds.slowest) & (rates < 0.999 * self.bounds.fastest)))
+        seen = bool(np.all(rates < 0.999 * self.bounds.fastest))
         return apart and seen and bool(np.all(weights[1:] > 1e-6 * weights.sum()))
 
     @property
@@ -82,5 +88,7 @@ def _ordered(structure: Structure, s: Solution, bounds: Bounds) -> Estimate:
     k, r = structure.shape_size, structure.order
     by_rate = np.argsort(-s.x[k : k + r], kind="stable")
     pasts = [structure.past(j).start + by_rate for j in range(structure.pasts)]
-    order = np.concatenate([np.arange(structure.family.size), *pasts, k + by_rate, [k + r], k + r + 1 + by_rate]).astype(np.intp)
+    order = np.concatenate(
+        [np.arange(structure.family.size), *pasts, k + by_rate, [k + r], k + r + 1 + by_rate]
+    ).astype(np.intp)
     return Estimate(structure, s.x[order], s.cost, s.matrix[np.ix_(order, order)], s.converged, bounds)

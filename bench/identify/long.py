@@ -31,7 +31,7 @@ def is_long(m: Measurement) -> bool:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A piece of a measurement on its union grid; (n,), `at`: where its force samples stand; `forces`: which those are."""
+    """A piece of a measurement on its union grid; (n,). `at`: where its forces stand; `forces`: which those are."""
 
     time_s: Array
     position_mm: Array
@@ -64,13 +64,13 @@ def _slices(n: int) -> Iterator[slice]:
         yield slice(start, min(start + PIECE, n))
 
 
-def shortened(m: Measurement, depth_mm: float, force_N: float) -> tuple[Run, float]:
-    """The run in blocks, and Σ w (y − block mean)²: what averaging has taken out of the cost."""
+def shortened(m: Measurement, depth_mm: float, force_N: float) -> Run:
+    """The run in blocks, each of the mean of its samples and of their number's weight."""
     total = max(len(m.position_time_s), len(m.force_time_s))
     length = -(-total // ROWS)
     counted = m.counted()
     parts: list[tuple[Array, ...]] = []
-    scatter, first = 0.0, True
+    first = True
     for s in stretches(m):
         y, w = np.zeros(len(s.time_s)), np.zeros(len(s.time_s))
         y[s.at] = m.force_N[s.forces] / force_N
@@ -80,15 +80,16 @@ def shortened(m: Measurement, depth_mm: float, force_N: float) -> tuple[Run, flo
         if first:  # a run's first sample stays alone: the jump from rest to it is part of the motion
             owner[1:] += 1
             first = False
-        weight = np.bincount(owner, w)
+        weight = np.asarray(np.bincount(owner, w), dtype=np.float64)
         share = np.where(weight[owner] > 0, w, 1.0)
         count = np.bincount(owner, share)
         with np.errstate(invalid="ignore"):
             mean = np.where(weight > 0, np.bincount(owner, w * y) / weight, 0.0)
-        scatter += float(np.sum(w * (y - mean[owner]) ** 2))
-        parts.append((np.bincount(owner, share * s.time_s) / count, np.bincount(owner, share * u) / count, mean, weight))
+        parts.append(
+            (np.bincount(owner, share * s.time_s) / count, np.bincount(owner, share * u) / count, mean, weight)
+        )
     time, u, y, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Run(time, np.diff(time, prepend=time[0]), u, y, np.asarray(weight, dtype=np.float64)), scatter
+    return Run(time, np.diff(time, prepend=time[0]), u, y, weight)
 
 
 def _owners(u: Array, length: int) -> NDArray[np.intp]:

@@ -23,9 +23,7 @@ def glanced(m: Measurement) -> Measurement:
     if p == f == 1:
         return m
     position, force = (m.position_time_s[::p], m.position_mm[::p]), (m.force_time_s[::f], m.force_N[::f])
-    return replace(
-        m, position_time_s=position[0], position_mm=position[1], force_time_s=force[0], force_N=force[1]
-    )
+    return replace(m, position_time_s=position[0], position_mm=position[1], force_time_s=force[0], force_N=force[1])
 
 
 def jitter(position: Array) -> float:

@@ -165,6 +165,11 @@ def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
     fast = [1 / nu for nu, a in zip(rates, weights[1:], strict=True) if a > 0 and 1 / nu < 3 * step]
     if fast:
         out.append(f"The fastest mode ({min(fast):.2g} s) is hardly longer than a sample ({step:.2g} s).")
+    if problem.rebuilt:
+        out.append(
+            "Fast moves were rebuilt between the samples: straight lines, as `simulate` has them, explain the force"
+            " less well."
+        )
     if not estimate.converged:
         out.append("The search did not converge.")
     out.append(

@@ -63,10 +63,9 @@ def _lost(estimate: Estimate) -> set[str]:
             f"{letter}_{i}" for letter in ("c", "nu") for i in range(1, r + 1)
         }
     for i in range(1, r + 1):
-        if x[k + r + i] <= 0:
+        # At the edge of what the data see a share and its rate stand for each other.
+        if x[k + r + i] <= 0 or not lower[k + i - 1] < x[k + i - 1] < upper[k + i - 1]:
             out |= {f"c_{i}", f"nu_{i}"}
-        if not lower[k + i - 1] < x[k + i - 1] < upper[k + i - 1]:
-            out.add(f"nu_{i}")
     k = structure.family.size
     if k and not np.all((lower[:k] < x[:k]) & (x[:k] < upper[:k])):
         out |= {"exponential": {"m", "b"}, "power": {"p", "q"}}.get(structure.family.name, set())

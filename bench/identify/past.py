@@ -52,4 +52,4 @@ def begins_loaded(m: Measurement, depth_mm: float, force_N: float, noise: Noise)
     if quarter < 3:
         return False
     change = abs(float(np.mean(force[:quarter]) - np.mean(force[still - quarter : still])))
-    return change > max(CLEAR * noise.force_N * np.sqrt(2 / quarter), LEAST_FORCE * force_N)
+    return change > float(max(CLEAR * noise.force_N * np.sqrt(2 / quarter), LEAST_FORCE * force_N))

@@ -15,7 +15,7 @@ from sim.pad import union
 
 from ._kernel import Array
 from .long import is_long, shortened
-from .motion import jitter
+from .motion import LONG, jitter
 from .runs import Run
 
 __all__ = ["Problem", "Run", "build"]
@@ -40,13 +40,16 @@ class Problem:
     """Variance of the force's noise, scaled; the prior was weighed by it."""
     rebuilt: bool = False
     """Whether there are nodes between samples (`bench.motion_between`)."""
-    scatter: float = 0.0
-    """Σ w e² within the blocks of long runs, whatever the model."""
 
     @property
     def weight(self) -> float:
         """Samples that count."""
         return float(sum(run.weight.sum() for run in self.runs))
+
+    @property
+    def in_blocks(self) -> bool:
+        """Whether a long run stands in blocks."""
+        return any(len(at) == 0 for at in self.where)
 
     @property
     def pasts(self) -> int:
@@ -100,19 +103,20 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
         raise InputError(names, "the force is zero throughout", "Is the force channel connected, its column right?")
     runs: list[Run] = []
     where: list[NDArray[np.intp]] = []
-    more, scatter = 0, 0.0
-    for m in checked:
+    more = 0
+    for k, m in enumerate(checked):
         if blocks and is_long(m):
-            run, lost = shortened(m, depth, force)
-            at, scatter = np.zeros(0, dtype=np.intp), scatter + lost
+            if between and len(m.position_time_s) <= LONG:  # many forces to few positions
+                time, position = motion_between(m.position_time_s, m.position_mm, noise_mm=jitter(m.position_mm))
+                more += len(time) - len(m.position_time_s)
+                checked[k] = m = replace(m, position_time_s=time, position_mm=position)
+            run, at = shortened(m, depth, force), np.zeros(0, dtype=np.intp)
         else:
             run, at, nodes = _run(m, depth, force, between)
             more += nodes
         runs.append(run)
         where.append(at)
-    return Problem(
-        tuple(runs), depth, force, tuple(checked), tuple(where), tuple(notes), rebuilt=more > 0, scatter=scatter
-    )
+    return Problem(tuple(runs), depth, force, tuple(checked), tuple(where), tuple(notes), rebuilt=more > 0)
 
 
 def _counted(m: Measurement) -> NDArray[np.bool_]:

@@ -52,7 +52,7 @@ class Evidence:
 
     @property
     def label(self) -> str:
-        """The law's name, with the degree of a polynomial."""
+        """The law's name, with the degree of a polynomial, or the number of a spline's points."""
         return f"{self.law} {self.degree}" if self.degree else self.law
 
 

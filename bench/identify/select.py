@@ -95,7 +95,7 @@ def choose(
     for rank, c in enumerate(ranked):
         progress(f"comparing {c.estimate.structure.family.name}, order {c.estimate.structure.order}")
         finished.append(_finished(c, problem, short, owners, independent, contender=rank < CONTENDERS))
-    best = _pick(finished)
+    best = _pick(finished, exact)
     if all(best is not c for c in finished[:CONTENDERS]):
         better = _finished(best, problem, short, owners, independent, contender=True)
         finished = [better if c is best else c for c in finished]
@@ -138,7 +138,11 @@ class Ladder:
             starts = self._starter.first(r)
             if self.found:
                 starts += self._starter.next(self.found[-1].structure, self.found[-1].x)
-            self.found.append(search(self.problem, Structure(self.family, r, self.unilateral, self.problem.pasts), starts, self.bounds))
+            self.found.append(
+                search(
+                    self.problem, Structure(self.family, r, self.unilateral, self.problem.pasts), starts, self.bounds
+                )
+            )
 
     def _idle(self) -> bool:
         if len(self.found) < 2:
@@ -169,8 +173,16 @@ def judged(c: Candidate, independent: float) -> Candidate:
     return replace(c, criterion=independent * float(np.log(V)) + c.size * float(np.log(independent)))
 
 
-def _pick(candidates: list[Candidate]) -> Candidate:
-    able = [c for c in candidates if c.eligible] or candidates
+def _pick(candidates: list[Candidate], order_given: bool) -> Candidate:
+    """The best of those that may be chosen; of an order that was asked for, all that are physical may."""
+    able = [c for c in candidates if c.eligible]
+    ended = [c for c in candidates if c.estimate.physical and c.estimate.converged]
+    if order_given:
+        able = ended
+    elif able:  # a force that goes on falling is no reason to leave out the mode that it needs
+        least = min(c.criterion for c in able) - 2 * CLEAR
+        able += [c for c in ended if not c.eligible and c.estimate.distinct_but_slow and c.criterion < least]
+    able = able or candidates
     able = sorted(able, key=lambda c: c.criterion)
     # The contact whose best is best; a tie goes to the pad that can let go.
     for c in able:

@@ -15,6 +15,7 @@ from .select import CLEAR, Choice, choose, judged
 from .starts import Starter
 from .surface import with_surfaces
 
+TINY = 1e-300
 CLEARLY = 20.0  # of the criterion, and units of χ² that a trial must gain
 
 
@@ -37,7 +38,7 @@ def with_points(problem: Problem, choice: Choice, orders: Sequence[int], progres
     formulas = [judged(c, lower.independent) for c in choice.candidates]
     rival = rivals[_place(other)]
     formula = formulas[_place(choice)]
-    predicts = lower.independent * float(np.log(formula.held_out_square / rival.held_out_square))
+    predicts = lower.independent * float(np.log(max(formula.held_out_square, TINY) / max(rival.held_out_square, TINY)))
     wins = rival.eligible and rival.criterion < formula.criterion - CLEARLY and predicts > CLEAR
     return Choice(rival if wins else formula, [*formulas, *rivals], lower.independent)
 
@@ -54,4 +55,4 @@ def _gains(problem: Problem, choice: Choice, family: Points) -> bool:
     structure = replace(best.structure, family=with_surfaces(family, problem))
     starts = Starter(short, structure.family, structure.unilateral, best.bounds).first(structure.order, 2)
     trial = search(short, structure, starts, best.bounds)
-    return choice.independent * float(np.log(formula.cost / max(trial.cost, 1e-300))) > CLEARLY
+    return choice.independent * float(np.log(max(formula.cost, TINY) / max(trial.cost, TINY))) > CLEARLY

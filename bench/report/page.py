@@ -6,8 +6,11 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
+from bench.diagnose import words
+from bench.diagnose.result import Diagnosis
 from bench.recording.types import Event, Recording
 from bench.report import axes, curves, facts, markup, numbers, plots, verdict
+from bench.report import diagnosis as diagnosis_page
 from bench.report.markup import digits, figure, forces, section
 from bench.report.verdict import Verdict
 from bench.report.view import Curve, Evidence, FitView, Plan, PlanView
@@ -24,16 +27,26 @@ def write_report(
     title: str | None = None,
     fit_problem: str = "",
     host: Mapping[str, str] | None = None,
+    diagnosis: Diagnosis | None = None,
+    diagnosis_problem: str = "",
 ) -> None:
     """Write the report of a run to `path`.
 
-    `fit` is None where nothing was fitted, and `fit_problem` then says why. `plan` is on the recording's clock, in the
-    pad frame. `host` is the recording's `padbench.host` record, for date and versions. The same input gives the same
-    bytes. Files of the run folder are linked where they lie beside `path` already, so write them first. Raises OSError
-    where the file cannot be written.
+    `fit` is None where nothing was fitted, and `fit_problem` then says why; likewise `diagnosis`. `plan` is on the
+    recording's clock, in the pad frame. `host` is the recording's `padbench.host` record, for date and versions. The
+    same input gives the same bytes. Files of the run folder are linked where they lie beside `path` already, so write
+    them first. Raises OSError where the file cannot be written.
     """
     text = report_page(
-        recording, fit, plan=plan, title=title, fit_problem=fit_problem, host=host, beside=facts.beside(path)
+        recording,
+        fit,
+        plan=plan,
+        title=title,
+        fit_problem=fit_problem,
+        host=host,
+        beside=facts.beside(path),
+        diagnosis=diagnosis,
+        diagnosis_problem=diagnosis_problem,
     )
     path.write_text(text, encoding="utf-8")
 
@@ -47,6 +60,8 @@ def report_page(
     fit_problem: str = "",
     host: Mapping[str, str] | None = None,
     beside: str = "",
+    diagnosis: Diagnosis | None = None,
+    diagnosis_problem: str = "",
 ) -> str:
     """The report as HTML text (see `write_report`); `beside` is HTML already."""
     heading = title or _title(recording)
@@ -58,6 +73,7 @@ def report_page(
         ("indentation", "Force against indentation", _indentation(recording, fit)),
         ("corner", "The fastest ramp, enlarged", _corner(recording, fit)),
         ("model", "Model", _model(fit)),
+        *(diagnosis_page.sections(diagnosis, short=True) if diagnosis is not None else []),
         ("structures", "Structures tried", numbers.evidence(fit.evidence) if fit else ""),
         ("touch-off", "Tare and touch-off", facts.touch_off(recording)),
         ("sampling", "Sampling", facts.rates(recording)),
@@ -69,6 +85,7 @@ def report_page(
     body = (
         f'<h1>{markup.text(heading)}</h1>\n<p class="sub">{markup.text(_subtitle(recording, host))}</p>\n'
         + _verdicts(recording, fit, fit_problem)
+        + _diagnosed(diagnosis, diagnosis_problem)
         + f"<nav>{links}</nav>\n"
         + "".join(section(name, content, anchor) for anchor, name, content in there)
         + "<footer>Written by padbench. Units: mm, N, s. Depth grows into the pad, force is positive in compression."
@@ -98,6 +115,12 @@ def _verdicts(recording: Recording, fit: FitView | None, problem: str) -> str:
     notes = list(dict.fromkeys(notes))  # a fit repeats what it heard on reading
     extra = (_tiles(fit) if fit is not None else "") + markup.bullets(notes, "warn")
     return body + _card(of_fit, extra)
+
+
+def _diagnosed(diagnosis: Diagnosis | None, problem: str) -> str:
+    if diagnosis is not None:
+        return diagnosis_page.card(diagnosis, f"Diagnosis: {words.lowered(words.verdict(diagnosis))}", notes=False)
+    return _card(Verdict("plain", "No diagnosis was made", [problem]), "") if problem else ""
 
 
 def _card(said: Verdict, extra: str) -> str:

@@ -102,6 +102,8 @@ thead th{color:var(--muted);font-weight:600;font-size:.82rem;white-space:nowrap}
 tbody th{font-weight:600;white-space:nowrap}
 td:last-child:not(.n){min-width:10rem}
 td.n,th.n{text-align:right;white-space:nowrap}
+.causes td:nth-child(2){white-space:pre}
+.causes tbody th{white-space:normal;min-width:6.5rem}
 tr.chosen td,tr.chosen th{background:color-mix(in srgb,var(--noise) 14%,transparent)}
 tr.off td,tr.off th{color:var(--muted)}
 dl{columns:2 340px;column-gap:2rem;margin:0 0 .5rem;font-size:.94rem}

@@ -109,7 +109,7 @@ def test_a_defect_is_called_one_and_leaves_a_log(padbench, monkeypatch):
 
 def test_a_run_leaves_a_folder(folder):
     names = {path.name for path in folder.iterdir()}
-    assert names == {"recording.mcap", "model.yaml", "fit.json", "report.html"}
+    assert names == {"recording.mcap", "model.yaml", "fit.json", "diagnosis.json", "report.html"}
     page = (folder / "report.html").read_text("utf-8")
     assert page.startswith("<!doctype html>") or page.startswith("<!DOCTYPE html>")
     assert len(page) < 2_000_000

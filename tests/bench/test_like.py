@@ -33,12 +33,19 @@ def said_rmse(text: str) -> float:
     return float(found.group(1))
 
 
+def as_reported_rmse(text: str) -> float:
+    """On the positions as they are, on which a fit works: said beside where the motion as felt serves better."""
+    found = re.search(r"([0-9.e+-]+) N on the positions as reported", text)
+    return float(found.group(1)) if found else said_rmse(text)
+
+
 def test_simulate_agrees_with_the_fit(fitted, tmp_path, capsys):
     done, model, fit = fitted
     capsys.readouterr()
     assert main(["simulate", str(model), "--like", str(done.folder), "--out", str(tmp_path / "out.csv")]) == 0
     said = capsys.readouterr().out
-    assert said_rmse(said) == pytest.approx(fit["rmse"], rel=2e-3)
+    assert as_reported_rmse(said) == pytest.approx(fit["rmse"], rel=2e-3)
+    assert said_rmse(said) <= as_reported_rmse(said)
     assert "surface taken" in said
 
 
@@ -75,5 +82,5 @@ def test_csv_is_taken_as_it_is(fitted, tmp_path, capsys):
     said = capsys.readouterr().out
     read = read_recording(data).measurement()
     simulated = load_model(str(model)).simulate_at(read.position_time_s, read.position_mm, read.force_time_s)
-    assert said_rmse(said) == pytest.approx(float(np.sqrt(np.mean((read.force_N - simulated) ** 2))), rel=1e-4)
+    assert as_reported_rmse(said) == pytest.approx(float(np.sqrt(np.mean((read.force_N - simulated) ** 2))), rel=1e-4)
     assert "surface" not in said

@@ -240,7 +240,7 @@ def _pad(rng: np.random.Generator, effects: list[Any], overrides: dict[str, Any]
 
 
 def _shape(effect: Any, wanted: str | dict[str, str] | None, rng: np.random.Generator) -> str:
-    drawn = str(rng.choice(effect.shapes))
+    drawn = str(rng.choice(effect.drawn))
     if isinstance(wanted, dict):
         wanted = wanted.get(effect.id)
     elif wanted is not None and wanted not in effect.shapes:

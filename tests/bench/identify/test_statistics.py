@@ -6,13 +6,15 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 
 from bench.identify import FitResult, fit
 from tests.truth import crb, draw
 from tests.truth.dataset import Dataset, make
+from tests.truth.laws import Exponential
 from tests.truth.motion import staircase
 from tests.truth.noise import Coloured, Noise, White
-from tests.truth.pad import simulate
+from tests.truth.pad import Pad, simulate
 
 from .closed_form import of_dataset
 
@@ -95,3 +97,28 @@ def test_undetermined_where_the_bound_says_so() -> None:
                 assert name in one.result.undetermined, (name, relative)
             if 0 < relative < 0.2:
                 assert name not in one.result.undetermined, (name, relative)
+
+
+@pytest.mark.parametrize(
+    "pad",
+    [
+        Pad(Exponential(2.24, 0.69), (0.25, 0.2), (4.0, 0.004)),  # a time constant of four minutes, in 20 s
+        Pad(Exponential(2.24, 0.69), (0.25, 0.0008), (4.0, 0.35)),
+        Pad(Exponential(2.24, 0.69), (0.25, 0.15), (4.0, 3.4)),  # two rates that are one
+    ],
+    ids=["slow", "small", "near"],
+)
+def test_weak_modes_are_called_undetermined_and_strong_ones_not(pad: Pad) -> None:
+    path = staircase([0.6, 1.2, 1.8, 2.4, 1.2, 0.5, -0.5], 80.0, 3.0)
+    missed, false, weak, strong = 0, 0, 0, 0
+    for seed in range(4):
+        data = make(pad, path, 200.0, Noise(White(0.03)), np.random.default_rng(seed))
+        bound = crb.bound(data.truth)
+        result = fit(of_dataset(data), law="exponential", order=2)
+        for name, value in pad.parameters().items():
+            if bound[name] > abs(value):
+                weak, missed = weak + 1, missed + (name not in result.undetermined)
+            if bound[name] < 0.3 * abs(value):
+                strong, false = strong + 1, false + (name in result.undetermined)
+    assert weak >= 4 and strong >= 8
+    assert missed <= 0.25 * weak and false <= 0.1 * strong

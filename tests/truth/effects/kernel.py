@@ -5,8 +5,9 @@ modes z_i' = ν_i (u − z_i) are exact; F = u − Σ c_i z_i. Friction is exact
 frame is solved implicitly: the probe stands where  x = y − deflection(F(x)),  y being the motor side behind the play.
 
 Sources: friction by Dahl (1968), Stribeck, LuGre (Canudas de Wit et al. 1995), Maxwell slip (Iwan 1966);
-stress softening by Ogden and Roxburgh (1999), exponential (Miehe 1995), Zúñiga and Beatty (2002); damage by Kachanov
-(1958); adhesion after Derjaguin, Muller, Toporov (1975) and Johnson, Kendall, Roberts (1971). Units: mm, N, s.
+stress softening by Ogden and Roxburgh (1999), exponential (Miehe 1995), Zúñiga and Beatty (2002), Dorfmann and Ogden
+(2003); damage by Kachanov (1958); adhesion after Derjaguin, Muller, Toporov (1975), Johnson, Kendall, Roberts (1971),
+a capillary bridge of constant volume (Maugis 1987). Units: mm, N, s.
 """
 
 from __future__ import annotations
@@ -24,10 +25,12 @@ class Numbers(NamedTuple):
     step_s: float
     unilateral: bool = True
     stick_N: float = 0.0  # tension at which an attached surface lets go
+    stick_once: bool = False
     offset_mm: float = 0.0  # surface below the zero of position
-    frame_form: int = 0  # 1 linear, 2 stiffening
+    frame_form: int = 0  # 1 linear, 2 stiffening, 3 softer beyond a preload
     frame_mm_N: float = 0.0
     frame_force_N: float = 1.0
+    frame_stiff_share: float = 1.0
     friction_form: int = 0  # 1 Coulomb, 2 Stribeck, 3 Dahl, 4 LuGre, 5 Maxwell slip
     coulomb_N: float = 0.0
     presliding_mm: float = 1e-3
@@ -35,30 +38,30 @@ class Numbers(NamedTuple):
     stribeck_mm_s: float = 1.0
     bristle_Ns_mm: float = 0.0
     slide_Ns_mm: float = 0.0
-    softening_form: int = 0  # 1 exponential, 2 Ogden–Roxburgh, 3 Zúñiga–Beatty
+    softening_form: int = 0  # 1 exponential, 2 Ogden–Roxburgh, 3 Zúñiga–Beatty, 4 Dorfmann–Ogden
     softening_share: float = 0.0
     softening_mm: float = 1.0
     softening_Nmm: float = 1.0
-    damage_form: int = 0  # 1 exponential, 2 Kachanov, 3 saturating
+    damage_form: int = 0  # 1 exponential, 2 Kachanov, 3 saturating, 4 logarithmic
     damage_per_mm: float = 0.0
     damage_limit: float = 1.0
-    set_form: int = 0  # 1 linear, 2 saturating, 3 beyond a yield depth
+    set_form: int = 0  # 1 linear, 2 saturating, 3 beyond a yield depth, 4 progressive
     set_mm_mm: float = 0.0
     set_limit_mm: float = 1.0
-    adhesion_form: int = 0  # 1 exponential, 2 snaps off, 3 neck
+    adhesion_form: int = 0  # 1 exponential, 2 snaps off, 3 neck, 4 capillary bridge
     pull_off_N: float = 0.0
     adhesion_mm: float = 1.0
-    damping_form: int = 0  # 1 linear, 2 proportional to depth, 3 thinning
+    damping_form: int = 0  # 1 linear, 2 proportional to depth, 3 thinning, 4 thickening
     damping_Ns_mm: float = 0.0
     damping_ref: float = 1.0
-    rate_form: int = 0  # 1 linear, 2 exponential, 3 saturating
+    rate_form: int = 0  # 1 linear, 2 exponential, 3 saturating, 4 free volume
     rate_per_mm: float = 0.0
     table_mm: float = 1e-3
 
 
 # State: deepest raw depth, deepest depth, path of loading, surface and the one before, u, whether in contact (and
-# for how many nodes), whether attached by adhesion, probe position.
-_RAW, _DEEPEST, _PATH, _S, _S1, _U, _CONTACT, _ATTACHED, _X = range(9)
+# for how many nodes), whether attached by adhesion, probe position, whether a bond that bears once has broken.
+_RAW, _DEEPEST, _PATH, _S, _S1, _U, _CONTACT, _ATTACHED, _X, _BROKEN = range(10)
 _SLIPS = 6
 
 
@@ -97,6 +100,9 @@ def _elastic(p, table, depth, deepest, keep):
             most = _energy(table, deepest, p.table_mm)
             scale = p.softening_Nmm + 0.05 * most
             u *= 1 - p.softening_share * math.erf((most - _energy(table, depth, p.table_mm)) / scale)
+        elif p.softening_form == 4:
+            lost = _energy(table, deepest, p.table_mm) - _energy(table, depth, p.table_mm)
+            u *= 1 - p.softening_share * math.tanh(lost / p.softening_Nmm)
         else:
             u *= math.exp(-p.softening_share * math.sqrt(below / p.softening_mm))
     return u
@@ -111,6 +117,8 @@ def _kept(p, path):
         return math.exp(-p.damage_per_mm * path)
     if p.damage_form == 2:  # dD/dλ = r / (1 − D)²
         return max(1 - 3 * p.damage_per_mm * path, 0.01) ** (1 / 3)
+    if p.damage_form == 4:
+        return max(1 - p.damage_per_mm * p.damage_limit * math.log1p(path / p.damage_limit), 0.01)
     return 1 + p.damage_limit * math.expm1(-p.damage_per_mm * path / p.damage_limit)
 
 
@@ -123,6 +131,8 @@ def _sunk(p, deepest):
         return p.set_mm_mm * deepest
     if p.set_form == 2:
         return -p.set_limit_mm * math.expm1(-p.set_mm_mm * deepest / p.set_limit_mm)
+    if p.set_form == 4:
+        return p.set_mm_mm * deepest**1.5 / math.sqrt(p.set_limit_mm)
     return p.set_mm_mm * max(deepest - p.set_limit_mm, 0.0)
 
 
@@ -134,7 +144,8 @@ def _damped(p, speed, depth):
         return p.damping_Ns_mm * speed
     if p.damping_form == 2:
         return p.damping_Ns_mm * speed * depth / p.damping_ref
-    return math.copysign(p.damping_Ns_mm * p.damping_ref * (abs(speed) / p.damping_ref) ** 0.7, speed)
+    exponent = 0.7 if p.damping_form == 3 else 1.3
+    return math.copysign(p.damping_Ns_mm * p.damping_ref * (abs(speed) / p.damping_ref) ** exponent, speed)
 
 
 @njit(cache=True)
@@ -172,6 +183,10 @@ def _friction(p, slips, dx, new):
 def _deflection(p, force):
     if p.frame_form == 2:
         return math.copysign(p.frame_mm_N * p.frame_force_N * math.log1p(abs(force) / p.frame_force_N), force)
+    if p.frame_form == 3 and force <= p.frame_force_N:
+        return p.frame_stiff_share * p.frame_mm_N * force
+    if p.frame_form == 3:
+        return p.frame_mm_N * (force - (1 - p.frame_stiff_share) * p.frame_force_N)
     return p.frame_mm_N * force
 
 
@@ -214,7 +229,9 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
         speed = (inner - state[_S]) / p.step_s
     force = held * u - remembered + _damped(p, speed, inner)
     new[_S] = inner
-    touching = (not p.unilateral) or force >= (-p.stick_N if was else -1e-13)
+    bears = was and not (p.stick_once and state[_BROKEN] > 0)
+    touching = (not p.unilateral) or force >= (-p.stick_N if bears else -1e-13)
+    new[_BROKEN] = 1.0 if was and not touching else state[_BROKEN]
     if touching:
         new[_CONTACT] = state[_CONTACT] + 1
     else:
@@ -237,6 +254,8 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
             new[_ATTACHED] = 0.0
         if p.adhesion_form == 1:
             force -= p.pull_off_N * math.exp(-gap / p.adhesion_mm)
+        elif new[_ATTACHED] > 0 and p.adhesion_form == 4:
+            force -= p.pull_off_N * (1 - gap / math.sqrt(gap * gap + p.adhesion_mm * p.adhesion_mm))
         elif new[_ATTACHED] > 0 and p.adhesion_form == 2:
             force -= p.pull_off_N * (1 - 0.6 * gap / p.adhesion_mm)
         elif new[_ATTACHED] > 0:
@@ -253,6 +272,8 @@ def _rates(p, nu, factor, depth, e, k):
         factor *= math.exp(p.rate_per_mm * depth)
     elif p.rate_form == 3:
         factor *= max(1 + p.rate_per_mm * depth / (1 + depth / 4), 0.1)
+    elif p.rate_form == 4:
+        factor *= math.exp(p.rate_per_mm * depth / (1 + depth / 4))
     for i in range(nu.shape[0]):
         e[i] = math.exp(-nu[i] * factor * p.step_s)
         k[i] = -math.expm1(-nu[i] * factor * p.step_s) / (nu[i] * factor * p.step_s)
@@ -270,7 +291,7 @@ def run(p, table, c, nu, behind_mm, felt_N, height_mm, gain, rate_factor):
     cell, pad, probe, contact = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
     z, new_z, e, k = np.zeros(r), np.zeros(r), np.ones(r), np.ones(r)
     slips, new_slips = np.zeros(_SLIPS), np.zeros(_SLIPS)
-    state, new = np.zeros(9), np.zeros(9)
+    state, new = np.zeros(10), np.zeros(10)
     state[_X], probe[0], cell[0] = behind_mm[0], behind_mm[0], felt_N[0]
     stiffness = 1.0
     for j in range(1, n):

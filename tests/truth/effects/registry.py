@@ -8,12 +8,15 @@ An effect outside the catalogue is a new module in this folder, with for instanc
         return {"softer": 0.05 * size}
 
 and is asked for by `draw_case(seed, ("warming",))`. The hooks are the lists of `Plant` and of `Build`.
+
+A further shape of an effect that is there is `@more_shapes("warming", "stepped")` in a module of its own. It is asked
+for by name: what a seed draws by itself stays among the first shapes, so that its cases do not change.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -80,10 +83,14 @@ Hide = Callable[[Build, str, float], dict[str, Any]]
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect by its id: the shapes it takes, what it needs of pad and sampling, and how to hide it."""
+    """An effect by its id: the shapes it takes, what it needs of pad and sampling, and how to hide it.
+
+    shapes: all of them. drawn: the first ones, among which a seed draws.
+    """
 
     id: str
     shapes: tuple[str, ...]
+    drawn: tuple[str, ...]
     hide: Hide
     contact: str | None = None
     laws: tuple[str, ...] | None = None
@@ -91,13 +98,37 @@ class Effect:
 
 
 EFFECTS: dict[str, Effect] = {}
+_FIRST: dict[str, Effect] = {}
+_MORE: dict[str, dict[str, Hide]] = {}
+
+
+def _assemble(id: str, first: Effect) -> None:
+    more = _MORE.get(id, {})
+
+    def hide(build: Build, shape: str, size: float) -> dict[str, Any]:
+        return more.get(shape, first.hide)(build, shape, size)
+
+    EFFECTS[id] = replace(first, shapes=(*first.drawn, *more), hide=hide if more else first.hide)
 
 
 def effect(id: str, *shapes: str, **needs: Any) -> Callable[[Hide], Hide]:
     """Register `hide(build, shape, size)` under an id; `needs` are the fields of `Effect`."""
 
     def register(hide: Hide) -> Hide:
-        EFFECTS[id] = Effect(id, shapes, hide, **needs)
+        _FIRST[id] = Effect(id, shapes, shapes, hide, **needs)
+        _assemble(id, _FIRST[id])
+        return hide
+
+    return register
+
+
+def more_shapes(id: str, *shapes: str) -> Callable[[Hide], Hide]:
+    """Register shapes beyond the first of an effect that is registered before or after."""
+
+    def register(hide: Hide) -> Hide:
+        _MORE.setdefault(id, {}).update(dict.fromkeys(shapes, hide))
+        if id in _FIRST:
+            _assemble(id, _FIRST[id])
         return hide
 
     return register

@@ -1,0 +1,97 @@
+"""What a person reads of a diagnosis."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from bench.diagnose.result import Number
+from bench.diagnose.words import NAMES, headline, lines, name_of, percent
+from sim.effects import all_effects
+from tests.bench.diagnose.small import PAD, made_up
+
+
+def test_every_effect_has_a_name_of_its_own():
+    named = [name_of(id) for id in all_effects()]
+    assert set(NAMES) == set(all_effects())
+    assert len(set(named)) == len(named)
+
+
+def test_what_how_big_how_sure_and_what_to_check():
+    said = "\n".join(lines(made_up()))
+    first = said.splitlines()[0]
+    assert first.startswith("explained by friction: error 52 mN → 16.8 mN")
+    assert "noise 10 mN" in first
+    assert "93 % of the error" in said and "80 % sure" in said
+    assert "coulomb = 0.05 ± 0.004 N" in said
+    assert "cannot exclude: backlash (97 % of the gain)" in said
+    assert "check: grease the guide" in said
+    assert "0.1 % of the force samples are flagged" in said
+    assert "goes with the speed" in said and "course of the run" not in said, "only what passed is told"
+
+
+def test_excluded_rivals_are_said_to_be_excluded_and_only_near_ones():
+    d = made_up()
+    near = replace(d.causes[0].alternatives[0], excluded=True)
+    said = "\n".join(lines(made_up(causes=[replace(d.causes[0], alternatives=[near])])))
+    assert "excluded, though near: backlash" in said and "cannot exclude" not in said
+    far = replace(near, gain_share=0.1)
+    assert "backlash" not in "\n".join(lines(made_up(causes=[replace(d.causes[0], alternatives=[far])])))
+
+
+def test_two_causes_are_both_named():
+    first = made_up().causes[0]
+    second = replace(first, id="force_drift", form="linear", parameters={"rate": Number(1e-3, "N/s", float("nan"))})
+    said = lines(made_up(causes=[first, second]))
+    assert said[0].startswith("explained by friction and a drifting force:")
+    assert any(line.strip() == "rate = 0.001 N/s" or line.strip().startswith("rate = 0.001 N/s") for line in said)
+
+
+@pytest.mark.parametrize(
+    ("changes", "pattern"),
+    [
+        (
+            {"verdict": "consistent", "causes": []},
+            "^consistent: the model explains .* noise; error 51 mN, noise 10 mN$",
+        ),
+        ({"verdict": "unexplained", "causes": [], "left": 1.0}, "^unexplained: no known cause"),
+        ({"verdict": "unexplained", "left": 0.6}, "^unexplained: friction takes 40 % .* no known cause the rest"),
+        (
+            {"verdict": "consistent", "causes": [], "model_dict": {"pad": {"elastic": {"law": "none"}}}},
+            "^consistent: the bench in free air",
+        ),
+    ],
+)
+def test_verdicts(changes, pattern):
+    assert re.search(pattern, headline(made_up(**changes)))
+
+
+def test_what_cannot_be_explained_is_not_left_at_that():
+    assert any("docs/effects.md" in line for line in lines(made_up(verdict="unexplained", causes=[], left=1.0)))
+
+
+def test_errors_that_hardly_differ_are_told_apart():
+    assert "10.104 mN → 10.079 mN" in headline(made_up(held_out_before=0.010104, held_out_after=0.010079))
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(1.0, "100 %"), (0.999, "99.9 %"), (0.9996, "100 %"), (0.25, "25 %"), (0.0031, "0.31 %")]
+)
+def test_percent(share, said):
+    assert percent(share) == said
+
+
+def test_a_next_test_is_told_with_its_option():
+    said = lines(made_up(next_protocol={"description": "Tells friction from backlash: slow ramps."}))[-1]
+    assert "Tells friction from backlash" in said and "--next" in said
+
+
+def test_numbers_that_were_not_fitted_are_left_out():
+    d = made_up(causes=[replace(made_up().causes[0], form="stribeck", parameters={
+        "coulomb": Number(0.05, "N", 0.004), "presliding": Number(0.001, "mm", float("nan"))})])  # fmt: skip
+    fixed = {p.name for p in all_effects()["friction"].form("stribeck").parameters if p.fixed}
+    said = "\n".join(lines(d))
+    assert ("presliding" in said) == ("presliding" not in fixed)
+    assert PAD["elastic"]["law"] == "exponential"

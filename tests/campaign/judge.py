@@ -1,0 +1,190 @@
+"""One case from end to end: drawn, written, read back, diagnosed, compared with the truth; a line of JSON.
+
+The diagnosis is handed what a lab would hand it, a CSV file and a model file, and nothing else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import tempfile
+import time
+import traceback
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.truth.cases import Case, draw_case
+from tests.truth.detect import Lab, _coordinates, _pad, _sigma, _whitened, misfit, sampling
+from tests.truth.noise import Coloured, Quantised, StudentT, White
+
+from .plan import Item
+
+ROOT = Path(__file__).resolve().parents[2]
+FLAGS = {"saturated": "saturation", "stuck": "stuck_samples", "outlier": "outliers"}
+"""Names of the truth, and of the diagnosis."""
+
+NOISE_KINDS = {White: "white", Coloured: "coloured", Quantised: "quantised", StudentT: "heavy"}
+
+RANKED = 8
+"""Candidates for the first cause that a line keeps."""
+
+
+@cache
+def code() -> str:
+    """A mark of the code that diagnoses, so that results of several versions are not taken for one."""
+    files = sorted(
+        path for folder in ("bench/diagnose", "bench/identify", "sim") for path in (ROOT / folder).rglob("*.py")
+    )
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:8]
+
+
+def run(item: Item, keep: Path | None = None) -> dict[str, Any]:
+    """The line of a case; with `error` where something raised. `keep`: where data and model are left."""
+    line: dict[str, Any] = {"key": item.key, "item": item.to_json(), "code": code()}
+    try:
+        case = item.case()
+        line |= truth_of(case)
+        if keep is None:
+            with tempfile.TemporaryDirectory() as folder:
+                line |= diagnosed(case, case.write(folder))
+        else:
+            line |= diagnosed(case, case.write(keep))
+        line["bounds"] = _bounds(item, line)
+    except Exception:
+        line["error"] = traceback.format_exc(limit=-4)
+    return line
+
+
+def truth_of(case: Case) -> dict[str, Any]:
+    """What was hidden, in what noise, and whether anything of it can be seen."""
+    truth = case.truth
+    seen = misfit(case)
+    n = len(case.force_N)
+    alone = {}
+    if len(truth.ids) > 1:
+        alone = {id: bool(misfit(case.alone(id)).detectable) for id in truth.ids}
+    return {
+        "truth": {
+            "parameters": truth.parameters,
+            "protocol": truth.protocol,
+            "rate_hz": truth.rate_hz,
+            "samples": n,
+            "own_clock": case.force_time_s is not None,
+            "law": truth.structure.law.__class__.__name__,
+            "contact": truth.structure.contact,
+            "modes": len(truth.structure.rates),
+            "noise": NOISE_KINDS[type(truth.noise)],
+            "noise_N": truth.noise.std,
+            "position_std_mm": truth.position_std_mm,
+            "floor_N": truth.noise_floor_N,
+            "chi2": seen.chi2,
+            "faults": seen.faults,
+            "detectable": bool(seen.detectable),
+            "misfit_N": seen.rmse_N,
+            "of_noise_power": (seen.chi2 + seen.faults) / n,
+            "alone": alone,
+            "coarse_chi2": sampling(case),
+        }
+    }
+
+
+def diagnosed(case: Case, folder: Path) -> dict[str, Any]:
+    """What the diagnosis says of the files in a folder, and its flags held against the truth's."""
+    from bench.config import load_model
+    from bench.diagnose import diagnose
+    from bench.recording import read_recording
+
+    measurement = read_recording(folder / "data.csv").measurement()
+    believed = load_model(folder / "believed.yaml")
+    wall, cpu = time.perf_counter(), time.process_time()
+    result = diagnose(measurement, believed)
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    said = result.to_json()
+    flags = said.pop("flags", {})
+    said.pop("next_protocol", None)
+    ranking = [
+        {"id": a.id, "form": a.form, "gain_share": a.gain_share, "delta_chi2": a.delta_chi2}
+        for a in list(getattr(result, "ranking", []))[:RANKED]
+    ]
+    flagged = score_flags(case, measurement.force_time_s, flags)
+    return {"said": said, "ranking": ranking, "flags": flagged, "seconds": wall, "cpu_seconds": cpu}
+
+
+def score_flags(case: Case, force_time_s: np.ndarray, flags: dict[str, list[int]]) -> dict[str, list[int]]:
+    """By fault (hit, flagged, true) samples, among those that the reading of the file kept; `any` for all at once."""
+    stamps = case.time_s if case.force_time_s is None else case.force_time_s
+    index = np.searchsorted((stamps[1:] + stamps[:-1]) / 2, force_time_s)
+    n, out = len(index), {}
+    all_said, all_true = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    for mine, theirs in FLAGS.items():
+        true = case.truth.flags.get(mine, np.zeros(len(stamps), dtype=bool))[index]
+        said = np.zeros(n, dtype=bool)
+        said[np.asarray(flags.get(theirs, []), dtype=int)] = True
+        all_said, all_true = all_said | said, all_true | true
+        if said.any() or true.any():
+            out[theirs] = [int((said & true).sum()), int(said.sum()), int(true.sum())]
+    out["any"] = [int((all_said & all_true).sum()), int(all_said.sum()), int(all_true.sum())]
+    return out
+
+
+def named(line: dict[str, Any], id: str) -> dict[str, Any] | None:
+    """The cause of that id, if it was named."""
+    return next((cause for cause in line["said"]["causes"] if cause["id"] == id), None)
+
+
+def _bounds(item: Item, line: dict[str, Any]) -> dict[str, float]:
+    """Cramér–Rao bounds of the parameters of a lone effect, where a stated deviation is over a quarter of the value."""
+    if item.group not in ("single", "large"):
+        return {}
+    cause, truth = named(line, item.ids[0]), line["truth"]["parameters"][item.ids[0]]
+    if cause is None:
+        return {}
+    wide = [
+        name
+        for name, value in truth.items()
+        if isinstance(value, float) and (cause["parameters"].get(name, {}).get("std") or 0.0) > abs(value) / 4
+    ]
+    return bounds(item, wide) if wide else {}
+
+
+def bounds(item: Item, names: list[str]) -> dict[str, float]:
+    """Smallest standard deviations of parameters that go with the size, the pad's numbers being unknown too.
+
+    With s = ∂F/∂(size) of the clean force, weighed by the noise and freed of what the pad's numbers can do,
+    std(size) ≥ 1/‖s‖, and a parameter's by how much it goes with the size. Random draws are held.
+    """
+    case = item.case()
+    truth, size = case.truth, item.sizes[0]
+    h = 0.02 * size
+    above, below = (
+        draw_case(
+            item.seed,
+            item.ids,
+            size + sign * h,
+            item.shapes[0],
+            **truth.overrides,
+            drawn=truth.drawn,
+            motion=truth.motion,
+        ).truth
+        for sign in (1, -1)
+    )
+    lab = Lab(truth)
+    scale = truth.noise.std / _sigma(truth, lab)
+    x = _coordinates(truth.structure)
+    columns = [(above.clean_N - below.clean_N) / (2 * h)]
+    for k in range(len(x)):
+        step = 1e-4 * max(abs(x[k]), 0.1) * (np.arange(len(x)) == k)
+        columns.append((lab.force(_pad(truth.structure, x + step)) - lab.force(_pad(truth.structure, x - step))) / 2)
+    weighed = [_whitened(truth.noise, truth.label_time_s, column * scale) for column in columns]
+    own, pad = weighed[0], np.stack(weighed[1:], axis=1)
+    pad = pad / np.maximum(np.linalg.norm(pad, axis=0), 1e-300)
+    free = own - pad @ np.linalg.lstsq(pad, own, rcond=None)[0]
+    norm = float(np.linalg.norm(free))
+    id, out = item.ids[0], {}
+    for name in names:
+        slope = (above.parameters[id][name] - below.parameters[id][name]) / (2 * h)
+        out[name] = abs(slope) / norm if norm > 0 else math.inf
+    return out

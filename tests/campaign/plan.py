@@ -1,0 +1,135 @@
+"""Which cases a campaign draws. Each is decided by the campaign's seed, its group, its ids and its number in the group.
+
+A larger campaign of the same seed holds the smaller one, so that a file of results can be carried on.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from tests.truth.cases import NOISES, Case, draw_case
+from tests.truth.effects import EFFECTS
+
+CATALOGUE = (
+    *("frame_compliance", "backlash", "contact_offset", "friction", "inertia", "resonance", "cogging", "force_delay"),
+    *("clock_skew", "sensor_lag", "force_bias", "force_drift", "mains_hum", "saturation", "outliers", "stuck_samples"),
+    *("encoder_error", "separation", "adhesion", "elastic_law", "stress_softening", "damage", "permanent_set"),
+    *("missing_relaxation_mode", "depth_dependent_relaxation", "viscous_damping"),
+)
+"""The ids that a diagnosis can name (docs/formats.md). What else is registered with the truth lies outside."""
+
+GROUPS = ("single", "large", "null", "pair", "outside")
+LARGE = 2.5
+"""Times the typical size."""
+
+SIZES = {"single": (0.05, 2.5), "large": (LARGE, LARGE), "pair": (0.5, 2.0), "outside": (0.5, 2.5)}
+"""Log-uniform between these, times the typical size."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """One case to be drawn; `noise` is given where the group goes through the kinds, else the seed draws it."""
+
+    group: str
+    ids: tuple[str, ...]
+    shapes: tuple[str, ...]
+    sizes: tuple[float, ...]
+    seed: int
+    noise: str | None = None
+
+    @property
+    def key(self) -> str:
+        """What a line of the results is known by."""
+        what = "+".join(self.ids) or str(self.noise)
+        how = "+".join(f"{shape}@{size:.3g}" for shape, size in zip(self.shapes, self.sizes, strict=True)) or "-"
+        return f"{self.group}/{what}/{how}/{self.seed}"
+
+    def case(self) -> Case:
+        """Draw it."""
+        told = {} if self.noise is None else {"noise_kind": self.noise}
+        sizes, shapes = (dict(zip(self.ids, values, strict=True)) for values in (self.sizes, self.shapes))
+        return draw_case(self.seed, self.ids, sizes, shapes, **told)
+
+    def to_json(self) -> dict[str, Any]:
+        """As it stands in a line of the results."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, content: dict[str, Any]) -> Item:
+        """The other way."""
+        return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in content.items()})
+
+
+def _stream(seed: int, group: str, what: str, number: int) -> np.random.Generator:
+    return np.random.default_rng([seed, zlib.crc32(f"{group}/{what}".encode()), number])
+
+
+def _item(group: str, ids: tuple[str, ...], number: int, rng: np.random.Generator, noise: str | None = None) -> Item:
+    low, high = np.log(SIZES.get(group, (1.0, 1.0)))
+    sizes = tuple(float(f"{np.exp(rng.uniform(low, high)):.4g}") for _ in ids)
+    # A single id goes through its shapes in turn, from another one for each id; in company they are drawn.
+    turn = number + zlib.crc32(f"{group}/{ids}".encode())
+    shapes = tuple(
+        EFFECTS[id].shapes[turn % len(EFFECTS[id].shapes)] if len(ids) == 1 else str(rng.choice(EFFECTS[id].shapes))
+        for id in ids
+    )
+    return Item(group, ids, shapes, sizes, int(rng.integers(2**31)), noise)
+
+
+def _compatible(first: str, second: str) -> bool:
+    a, b = EFFECTS[first], EFFECTS[second]
+    laws = a.laws is None or b.laws is None or bool(set(a.laws) & set(b.laws))
+    return laws and (a.contact is None or b.contact is None or a.contact == b.contact)
+
+
+def _pair(rng: np.random.Generator) -> tuple[str, str]:
+    known = [id for id in CATALOGUE if id in EFFECTS]
+    while True:
+        first, second = sorted(str(id) for id in rng.choice(known, 2, replace=False))
+        if _compatible(first, second):
+            return first, second
+
+
+def plan(
+    seed: int, single: int, large: int, null: int, pairs: int, outside: int, ids: Iterable[str] = ()
+) -> list[Item]:
+    """Cases in an order in which all groups go forward together: `single`, `large` for each id, the others in all.
+
+    `ids`: cases of these alone (null cases then only where no id is named).
+    """
+    wanted = set(ids)
+    known = [id for id in CATALOGUE if id in EFFECTS]
+    beyond = sorted(set(EFFECTS) - set(CATALOGUE))
+    placed: list[tuple[float, Item]] = []
+
+    def place(group: str, count: int, made: Iterable[Item]) -> None:
+        placed.extend(((k + 0.5) / count, item) for k, item in enumerate(made))
+
+    for group, count in (("single", single), ("large", large)):
+        rounds = (
+            _item(group, (id,), number, _stream(seed, group, id, number))
+            for number in range(count)
+            for id in _stream(seed, group, "order", number).permutation(known)
+        )
+        place(group, count * len(known), rounds)
+    nulls = ((k, _stream(seed, "null", "", k)) for k in range(null))
+    place("null", null, (_item("null", (), k, rng, NOISES[k % len(NOISES)]) for k, rng in nulls))
+    place(
+        "pair",
+        pairs,
+        (_item("pair", _pair(rng), k, rng) for k in range(pairs) for rng in [_stream(seed, "pair", "", k)]),
+    )
+    if beyond:
+        turns = ((k, beyond[k % len(beyond)]) for k in range(outside))
+        place(
+            "outside",
+            outside,
+            (_item("outside", (id,), k // len(beyond), _stream(seed, "outside", id, k)) for k, id in turns),
+        )
+    placed.sort(key=lambda pair: pair[0])
+    return [item for _, item in placed if not wanted or wanted & set(item.ids)]

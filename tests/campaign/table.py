@@ -1,0 +1,308 @@
+"""The page of a campaign, from its lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from tests.benchmarks.report import Table
+from tests.truth.cases import NOISES
+
+from .count import (
+    FLAGS_GOOD,
+    TOLD,
+    Line,
+    Rate,
+    both_detectable,
+    causes,
+    confusion,
+    detectable,
+    first,
+    flags_good,
+    flags_pair,
+    floor_between,
+    floor_near,
+    found,
+    held_out_near,
+    rate,
+    right_first,
+    right_listed,
+    spurious,
+    stated,
+)
+from .plan import CATALOGUE, GROUPS
+
+BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0 + 1e-9)
+"""Of confidence."""
+
+
+def page(lines: Sequence[Line], command: str) -> str:
+    """Markdown."""
+    good = [line for line in lines if "error" not in line]
+    by = {group: [line for line in good if line["item"]["group"] == group] for group in GROUPS}
+    versions = len({line["code"] for line in lines})
+    counts = ", ".join(f"{len(by[group])} {group}" for group in GROUPS)
+    blocks = [
+        "# How well the diagnosis does",
+        "",
+        "Effects are hidden in data by the independent simulator (`tests/truth`), in shapes written from the",
+        "literature and not from the diagnosis's own blocks; it is handed a CSV file and a model file. Written by",
+        "",
+        f"    {command}",
+        "",
+        f"{len(lines)} cases ({counts}), {len(lines) - len(good)} ended in an error"
+        + (f"; results of {versions} versions of the code are mixed." if versions > 1 else "."),
+        "",
+        "## Targets",
+        "",
+        *targets(good, by).lines(),
+        "",
+        *WHAT_IS_COUNTED.strip().splitlines(),
+        "",
+        "## By effect",
+        "",
+        "Single cases of all sizes, the large ones too. All but the first two columns count detectable cases.",
+        "",
+        *by_effect([*by["single"], *by["large"]]).lines(),
+        "",
+        "## By shape",
+        "",
+        *by_shape([*by["single"], *by["large"]]).lines(),
+        "",
+        "## By size and visibility",
+        "",
+        *by_size([*by["single"], *by["large"]]).lines(),
+        "",
+        "## What was named first",
+        "",
+        "Rows: what was hidden. Columns: what was named, by the number of its row; C consistent, U unexplained",
+        "without a cause. Detectable cases.",
+        "",
+        *confusion_table([line for line in [*by["single"], *by["large"]] if detectable(line)]).lines(),
+        "",
+        "## Nothing hidden",
+        "",
+        *by_noise(by["null"]).lines(),
+        "",
+        "## Confidence",
+        "",
+        "Causes named in single, large and pair cases that are detectable: how often the name was right.",
+        "",
+        *confidence([*filter(detectable, [*by["single"], *by["large"]]), *by["pair"]]).lines(),
+        "",
+        "## Faults of the channel",
+        "",
+        *faults(good).lines(),
+        "",
+        "## Time",
+        "",
+        *seconds(by).lines(),
+    ]
+    return "\n".join(blocks).rstrip() + "\n"
+
+
+WHAT_IS_COUNTED = """
+- *Detectable*: the believed structure, refitted to the data without noise, leaves χ² ≥ 60. Sizes of single cases are
+  log-uniform between 0.05 and 2.5 times the typical, those of pairs between 0.5 and 2, outside the catalogue between
+  0.5 and 2.5.
+- *Right id first*: strict. *Or not excluded*: the right id stands among the alternatives which the diagnosis says
+  that the data cannot exclude; whether the noise-free data bear that out is not computed.
+- *Spurious*: a cause after the first that was not hidden. *Both of a pair*: named at any place, of the pairs of which
+  each effect alone would be detectable.
+- *Parameter*: each of the contract's parameters of a cause that was rightly named first. The bound is that of Cramér
+  and Rao for the effect's size with the pad's numbers unknown.
+- *Noise floor*: the deviation of the force noise, and the same with the position's noise through the stiffness. A
+  diagnosis that averages the motion comes to rest between the two.
+- *Held-out error*: single and large cases rightly named, over the noise floor as stated.
+- Intervals are Wilson's at 95 %. A target whose interval holds it is open, whatever the rate.
+"""
+
+
+def targets(good: Sequence[Line], by: dict[str, list[Line]]) -> Table:
+    """Each target with what was reached."""
+    single, large = ([line for line in by[g] if detectable(line)] for g in ("single", "large"))
+    told = [line for line in single if line["truth"]["of_noise_power"] >= TOLD]
+    pairs, outside = [p for p in by["pair"] if both_detectable(p)], [o for o in by["outside"] if detectable(o)]
+    numbers = [s for line in [*single, *large] for s in stated(line)]
+    named = [line for line in [*single, *large] if right_first(line)]
+    faulty = [line for line in good if line["flags"]["any"][2]]
+    pooled = np.sum([line["flags"]["any"] for line in faulty], axis=0).tolist() if faulty else [0, 0, 0]
+    precision, recall = flags_pair(pooled)
+
+    table = Table(["target", "wanted", "reached", "95 % interval", "of", "met"])
+
+    def row(what: str, wanted: float | None, at_least: bool, reached: Rate) -> None:
+        low, high = reached.interval()
+        met = "–"
+        if wanted is not None and reached.n:
+            met = "yes" if (reached.share >= wanted if at_least else reached.share <= wanted) else "no"
+            met += ", open" if low < wanted < high else ""
+        sign = "≥" if at_least else "≤"
+        text = f"{sign} {100 * wanted:.3g} %" if wanted is not None else ""
+        table.rows.append((what, text, str(reached), f"{100 * low:.1f}–{100 * high:.1f} %", str(reached.n), met))
+
+    row("right cause first, single, detectable", 0.97, True, rate(single, right_first))
+    row("… or not excluded", None, True, rate(single, right_listed))
+    row("… misfit over 0.2 % of the noise power", None, True, rate(told, right_first))
+    row("right cause first at 2.5 times the typical size", 0.99, True, rate(large, right_first))
+    row("… or not excluded", None, True, rate(large, right_listed))
+    row("unexplained, single, detectable", 0.03, False, rate(single, lambda r: r["said"]["verdict"] == "unexplained"))
+    row("spurious second cause, single, detectable", 0.03, False, rate(single, spurious))
+    row("false alarm, nothing hidden", 0.02, False, rate(by["null"], lambda r: r["said"]["verdict"] != "consistent"))
+    row("both of a pair named", 0.90, True, rate(pairs, lambda r: all(found(r, i) for i in r["item"]["ids"])))
+    row("… and nothing else", None, True, rate(pairs, lambda r: sorted(causes(r)) == sorted(r["item"]["ids"])))
+    row(
+        "outside the catalogue: unexplained", 0.93, True, rate(outside, lambda r: r["said"]["verdict"] == "unexplained")
+    )
+    row("parameter within 10 % or two deviations", 0.90, True, Rate(sum(s.near for s in numbers), len(numbers)))
+    row("… deviation ≤ ¼ of the value or twice its bound", None, True, Rate(sum(s.sane for s in numbers), len(numbers)))
+    row("… both", 0.90, True, Rate(sum(s.near and s.sane for s in numbers), len(numbers)))
+    row("noise floor within 10 %: force noise", 0.95, True, rate(good, lambda r: floor_near(r, "noise_N")))
+    row("… with the position's", 0.95, True, rate(good, lambda r: floor_near(r, "floor_N")))
+    row("… between the two, 10 % allowed", 0.95, True, rate(good, floor_between))
+    row("held-out error ≤ 1.15 noise floor", 0.95, True, rate(named, held_out_near))
+    for what, value, n in (("precision", precision, pooled[1]), ("recall", recall, pooled[2])):
+        met = "–" if not n else "yes" if value >= FLAGS_GOOD else "no"
+        shown = f"{100 * value:.1f} %" if n else "–"
+        table.rows.append((f"{what} of flags, samples of cases with faults", "≥ 90 %", shown, "", str(n), met))
+    row("… cases in which both are ≥ 0.9", None, True, rate(faulty, lambda r: flags_good(r["flags"]["any"])))
+    return table
+
+
+def _effect_row(name: str, lines: Sequence[Line]) -> list[str]:
+    seen = [line for line in lines if detectable(line)]
+    numbers = [s for line in seen for s in stated(line)]
+    shares = (
+        rate(seen, right_first),
+        rate(seen, right_listed),
+        rate(seen, lambda r: r["said"]["verdict"] == "unexplained"),
+        rate(seen, spurious),
+        Rate(sum(s.near for s in numbers), len(numbers)),
+        Rate(sum(s.sane for s in numbers), len(numbers)),
+    )
+    held = [r["said"]["held_out_after"] / r["said"]["noise_floor"] for r in seen if right_first(r)]
+    middle = f"{np.median(held):.3f}" if held else "–"
+    return [name, str(len(lines)), str(len(seen)), *(f"{r.hits}/{r.n}" if r.n else "–" for r in shares), middle]
+
+
+_COLUMNS = (
+    *("n", "detectable", "right first", "or not excluded", "unexplained", "spurious", "parameters near"),
+    *("deviations sane", "held-out / floor, median"),
+)
+
+
+def by_effect(lines: Sequence[Line]) -> Table:
+    """A row an id."""
+    table = Table(["hidden", *_COLUMNS])
+    for id in CATALOGUE:
+        own = [line for line in lines if line["item"]["ids"][0] == id]
+        if own:
+            table.rows.append(_effect_row(id, own))
+    table.rows.append(_effect_row("all", lines))
+    return table
+
+
+def by_shape(lines: Sequence[Line]) -> Table:
+    """A row a shape of an id."""
+    table = Table(["hidden", *_COLUMNS])
+    shapes = sorted({(r["item"]["ids"][0], r["item"]["shapes"][0]) for r in lines})
+    for id, shape in shapes:
+        own = [r for r in lines if (r["item"]["ids"][0], r["item"]["shapes"][0]) == (id, shape)]
+        table.rows.append(_effect_row(f"{id}, {shape}", own))
+    return table
+
+
+def by_size(lines: Sequence[Line]) -> Table:
+    """Rows by size, by χ² of the misfit, by noise, sampling and protocol."""
+    table = Table(["cases", *_COLUMNS])
+
+    def rows(label: str, of: Callable[[Line], float], edges: Sequence[float]) -> None:
+        for low, high in zip(edges, edges[1:], strict=False):
+            own = [r for r in lines if low <= of(r) < high]
+            if own:
+                table.rows.append(_effect_row(f"{label} {low:g}–{high:g}", own))
+
+    rows("size", lambda r: r["item"]["sizes"][0], (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 3.0))
+    rows("χ²", lambda r: r["truth"]["chi2"] + r["truth"]["faults"], (0, 60, 300, 1e3, 1e4, 1e5, 1e9))
+    rows("rate/Hz", lambda r: r["truth"]["rate_hz"], (0, 200, 500, 1000, 2001))
+    for name, field in (("noise", "noise"), ("protocol", "protocol"), ("law", "law"), ("contact", "contact")):
+        for value in sorted({r["truth"][field] for r in lines}):
+            table.rows.append(_effect_row(f"{name} {value}", [r for r in lines if r["truth"][field] == value]))
+    return table
+
+
+def confusion_table(lines: Sequence[Line]) -> Table:
+    """Hidden × named first."""
+    counted = confusion(lines)
+    ids = [id for id in CATALOGUE if id in counted]
+    said = [*CATALOGUE, "consistent", "unexplained"]
+    used = [name for name in said if any(counted[id][name] for id in ids)]
+    short = {"consistent": "C", "unexplained": "U"}
+    table = Table(["hidden", *(short.get(name) or str(CATALOGUE.index(name) + 1) for name in used)])
+    for id in ids:
+        cells = [str(counted[id][name]) if counted[id][name] else "·" for name in used]
+        table.rows.append([f"{CATALOGUE.index(id) + 1} {id}", *cells])
+    return table
+
+
+def by_noise(lines: Sequence[Line]) -> Table:
+    """Null cases by the kind of their noise."""
+    table = Table(["noise", "n", "false alarms", "95 % interval", "named"])
+    for kind in (*NOISES, "all"):
+        own = [line for line in lines if kind in (line["truth"]["noise"], "all")]
+        alarms = rate(own, lambda r: r["said"]["verdict"] != "consistent")
+        low, high = alarms.interval()
+        what = sorted({first(line) for line in own} - {"consistent"})
+        table.rows.append(
+            [kind, str(len(own)), str(alarms.hits), f"{100 * low:.1f}–{100 * high:.1f} %", ", ".join(what)]
+        )
+    return table
+
+
+def confidence(lines: Sequence[Line]) -> Table:
+    """How often a name was right, by the confidence stated."""
+    pairs = [(c["confidence"], c["id"] in line["item"]["ids"]) for line in lines for c in line["said"]["causes"]]
+    table = Table(["confidence", "causes", "mean stated", "right", "95 % interval"])
+    for low, high in zip(BINS, BINS[1:], strict=False):
+        own = [(c, right) for c, right in pairs if low <= c < high]
+        if own:
+            right = Rate(sum(r for _, r in own), len(own))
+            a, b = right.interval()
+            mean = f"{np.mean([c for c, _ in own]):.3f}"
+            cells = [f"{low:g}–{min(high, 1):g}", str(len(own)), mean, str(right), f"{100 * a:.1f}–{100 * b:.1f} %"]
+            table.rows.append(cells)
+    return table
+
+
+def faults(lines: Sequence[Line]) -> Table:
+    """Flags by fault: in cases that have it, and what is flagged in cases that have none."""
+    table = Table(
+        ["fault", "cases", "precision", "recall", "mean precision", "mean recall", "both ≥ 0.9", "flagged without"]
+    )
+    for fault in ("saturation", "stuck_samples", "outliers", "any"):
+        own = [line["flags"][fault] for line in lines if line["flags"].get(fault, [0, 0, 0])[2]]
+        others = [line for line in lines if not line["flags"].get(fault, [0, 0, 0])[2]]
+        flagged = sum(line["flags"].get(fault, [0, 0, 0])[1] for line in others)
+        without = flagged / max(sum(line["truth"]["samples"] for line in others), 1)
+        cells = ["–"] * 5
+        if own:
+            pooled, each = flags_pair(np.sum(own, axis=0).tolist()), np.mean([flags_pair(c) for c in own], axis=0)
+            cells = [f"{value:.3f}" for value in (*pooled, *each)] + [f"{sum(map(flags_good, own))}/{len(own)}"]
+        table.rows.append([fault, str(len(own)), *cells, f"{100 * without:.3f} %"])
+    return table
+
+
+def seconds(by: dict[str, list[Line]]) -> Table:
+    """Wall and processor time of a diagnosis; the campaign's processes share the machine."""
+    table = Table(["cases", "n", "median/s", "95 % of them/s", "greatest/s", "processor, median/s", "samples, median"])
+    for group in GROUPS:
+        wall = [line["seconds"] for line in by[group]] or [math.nan]
+        cpu = [line["cpu_seconds"] for line in by[group]] or [math.nan]
+        samples = [line["truth"]["samples"] for line in by[group]] or [math.nan]
+        figures = (np.median(wall), np.quantile(wall, 0.95), np.max(wall), np.median(cpu))
+        if by[group]:
+            cells = [*(f"{f:.1f}" for f in figures), f"{np.median(samples):.0f}"]
+            table.rows.append([group, str(len(by[group])), *cells])
+    return table

@@ -1,0 +1,152 @@
+"""The judge is judged: intervals against the literature, the plan against its promise, flags against hand counts."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.truth.cases import draw_case
+from tests.truth.effects import EFFECTS
+
+from .__main__ import read
+from .count import Rate, right_listed, spurious, stated, wrongs
+from .judge import bounds, score_flags, truth_of
+from .plan import CATALOGUE, Item, plan
+from .table import page
+
+
+@pytest.mark.parametrize(
+    "hits, n, low, high", [(5, 10, 0.2366, 0.7634), (0, 10, 0.0, 0.2775), (81, 263, 0.2553, 0.3662)]
+)
+def test_wilson_interval(hits, n, low, high):
+    # The last is of Newcombe, Stat. Med. 17, 1998, 857-872, Table I.
+    assert Rate(hits, n).interval() == pytest.approx((low, high), abs=1e-4)
+
+
+def test_a_larger_campaign_holds_the_smaller():
+    small, large = plan(3, 2, 1, 6, 8, 5), plan(3, 5, 2, 20, 30, 9)
+    keys = [item.key for item in large]
+    assert {item.key for item in small} < set(keys) and len(set(keys)) == len(keys)
+    assert {item.key for item in plan(4, 2, 1, 6, 8, 5)}.isdisjoint(keys)
+
+
+def test_a_plan_has_every_id_and_every_shape():
+    items = [item for item in plan(1, 5, 1, 4, 0, 0) if item.group == "single"]
+    assert {(item.ids[0], item.shapes[0]) for item in items} == {(i, s) for i in CATALOGUE for s in EFFECTS[i].shapes}
+    assert all(0.05 <= item.sizes[0] <= 2.5 for item in items) and len(items) == 5 * len(CATALOGUE)
+
+
+def test_a_line_brings_its_case_back():
+    item = next(item for item in plan(1, 0, 0, 0, 3, 0) if item.group == "pair")
+    again = Item.from_json(json.loads(json.dumps(item.to_json())))
+    assert again == item
+    first, second = item.case(), again.case()
+    assert np.array_equal(first.force_N, second.force_N) and first.truth.ids == item.ids
+    assert set(truth_of(first)["truth"]["alone"]) == set(item.ids)
+
+
+def test_a_torn_line_is_left_out_and_the_last_of_a_key_counts(tmp_path):
+    file = tmp_path / "out.jsonl"
+    file.write_text('{"key": "a", "n": 1}\n{"key": "b", "n": 1}\n{"key": "a", "n": 2}\n{"key": "c", "n"')
+    assert read(file) == [{"key": "a", "n": 2}, {"key": "b", "n": 1}]
+
+
+def test_flags_are_counted_among_the_samples_that_were_read():
+    case = draw_case(1, ("outliers",), 1.0, "single", rate_hz=200.0, own_clock=True, jitter="none", protocol="rich")
+    true = np.flatnonzero(case.truth.flags["outlier"])
+    kept = np.arange(4, len(case.force_N))  # the first four were not read
+    there = np.isin(kept, true)
+    said = np.flatnonzero(there)[1:].tolist() + np.flatnonzero(~there)[:3].tolist()  # one missed, three too many
+    stamps = np.round(case.force_time_s[kept], 7)
+    n = int(there.sum())
+    assert score_flags(case, stamps, {"outliers": sorted(said)})["outliers"] == [n - 1, n + 2, n]
+
+
+def test_bound_of_a_bias_by_hand():
+    # A constant beside a pad of known shape: never better than σ/√n, and near it since the air tells it.
+    item = Item("single", ("force_bias",), ("constant",), (1.0,), 5, "white")
+    case = item.case()
+    bound = bounds(item, ["bias"])["bias"]
+    least = case.truth.noise.std / np.sqrt(len(case.force_N))
+    assert least <= bound < 5 * least
+
+
+def line(said, hidden=("friction",), group="single", verdict="explained", **more):
+    """A line with the causes said, each (id, value, std, alternatives not excluded)."""
+    causes = [
+        {
+            "id": id,
+            "parameters": {"coulomb": {"value": value, "std": std}},
+            "confidence": 0.9,
+            "alternatives": [{"id": a, "excluded": False} for a in others],
+        }
+        for id, value, std, others in said
+    ]
+    truth = {
+        "parameters": {id: {"coulomb": 0.1} for id in hidden},
+        "detectable": True,
+        "alone": dict.fromkeys(hidden, True),
+        "noise_N": 0.010,
+        "floor_N": 0.012,
+        "of_noise_power": 1.0,
+        "chi2": 1e4,
+        "faults": 0.0,
+        "samples": 1000,
+        "rate_hz": 100.0,
+        "noise": "white",
+        "protocol": "rich",
+        "law": "Power",
+        "contact": "bonded",
+    }
+    verdict = {"verdict": verdict, "causes": causes, "noise_floor": 0.011, "held_out_after": 0.0115, "left": 0.0}
+    item = {"group": group, "ids": list(hidden), "shapes": ["a"] * len(hidden), "sizes": [1.0] * len(hidden)}
+    flags = {"any": [0, 0, 0]}
+    whole = {"key": f"{group}{said}", "code": "x", "item": item, "truth": truth, "said": verdict, "flags": flags}
+    return whole | {"bounds": {}, "seconds": 1.0, "cpu_seconds": 1.0} | more
+
+
+GOOD = ("friction", 0.105, 0.001, ())
+
+
+@pytest.mark.parametrize(
+    "case, wrong",
+    [
+        (line([GOOD]), []),
+        (line([("friction", 0.12, 0.001, ())]), ["parameter off"]),
+        (line([("friction", 0.12, 0.011, ())]), []),
+        (line([("friction", 0.12, 0.04, ())]), ["deviation too wide"]),
+        (line([("friction", 0.12, 0.04, ())], bounds={"coulomb": 0.03}), []),
+        (line([("friction", 0.105, None, ())]), ["deviation too wide"]),
+        (line([("backlash", 0.1, 0.001, ("friction",))]), ["wrong first"]),
+        (line([GOOD, ("backlash", 0.1, 0.1, ())]), ["spurious second"]),
+        (line([], verdict="consistent"), ["missed"]),
+        (line([], verdict="unexplained"), ["missed", "unexplained"]),
+        (line([], (), "null", "consistent"), []),
+        (line([GOOD], (), "null"), ["false alarm"]),
+        (line([GOOD], ("friction", "backlash"), "pair"), ["one of a pair missed"]),
+        (line([GOOD], ("elsewhere",), "outside"), ["outside effect explained"]),
+        (line([GOOD], ("elsewhere",), "outside", "unexplained"), []),
+        (line([GOOD], flags={"any": [8, 8, 10]}), ["flags"]),
+        (line([GOOD], error="Traceback\nValueError: no"), ["error"]),
+    ],
+)
+def test_what_is_wrong_with_a_line(case, wrong):
+    assert wrongs(case) == wrong
+
+
+def test_second_causes_and_alternatives():
+    assert spurious(line([GOOD, ("backlash", 0.1, 0.1, ())])) and not spurious(line([GOOD]))
+    assert right_listed(line([("backlash", 0.1, 0.1, ("friction",))])) and not right_listed(
+        line([("backlash", 1, 1, ())])
+    )
+    assert [s.near for s in stated(line([GOOD]))] == [True] and stated(line([("backlash", 0.1, 0.1, ())])) == []
+
+
+def test_the_page_counts():
+    lines = [line([GOOD]), line([("backlash", 0.1, 0.001, ())]), line([], (), "null", "consistent")]
+    text = page(lines, "command")
+    row = next(row for row in text.splitlines() if row.startswith("| right cause first, single, detectable"))
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells[1:] == ["≥ 97 %", "50.0 %", "9.5–90.5 %", "2", "no"]
