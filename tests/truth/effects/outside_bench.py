@@ -41,7 +41,7 @@ def stick_slip(build: Build, shape: str, size: float) -> dict[str, float]:
     """Sticks and slips over ways that are never the same (Bowden and Leben 1939).
 
     `guide`: a seal or bushing, felt in air too; at rest it stays wherever it was. `contact_edge`: the edge of the
-    contact is pinned and jumps (Schallamach 1971), at rest too, every few seconds, so that the force goes with the load.
+    contact is pinned and jumps (Schallamach 1971), at rest too, every few seconds; the force goes with the load.
     """
     rng = build.rng
     amplitude, pitch = 0.04 * size * spread(rng, 0.8, 1.25), build.depth_mm * spread(rng, 0.06, 0.15)
