@@ -76,7 +76,7 @@ def test_the_frame_gives_way_by_what_the_cell_feels(shape):
         assert np.allclose(given, told["compliance"] * force, atol=1e-9)
     else:
         hard, soft = given[np.argmax(force)] / force.max(), told["compliance"]
-        assert hard < 0.97 * soft
+        assert hard > 1.03 * soft if shape == "joint_opens" else hard < 0.97 * soft
     # The pad behind the frame is the plain pad at the probe's own position.
     some = fine.time_s[::20]
     exact = simulate(pad, sampled(fine.time_s[::2], fine.probe_mm[::2]), some).force_N
@@ -200,7 +200,7 @@ def test_bias_drift_and_hum():
         samples, told = disturbed("mains_hum", shape, t)
         waves = np.stack([f(2 * np.pi * told["frequency"] * t) for f in (np.sin, np.cos)], axis=1)
         fit = np.linalg.lstsq(waves, samples.clean_N, rcond=None)[0]
-        assert np.hypot(*fit) == pytest.approx(told["amplitude"], rel=0.35 if shape == "wavering" else 1e-2)
+        assert np.hypot(*fit) == pytest.approx(told["amplitude"], rel=0.35 if shape in ("wavering", "grid") else 1e-2)
 
 
 def test_delay_and_skew_say_when_it_was_measured():
@@ -258,6 +258,10 @@ def test_softening_spares_the_virgin_curve(shape):
     depth = (deepest - x)[below]
     if shape == "exponential":
         assert np.allclose(lost, -told["share"] * np.expm1(-depth / told["depth"]), atol=1e-6)
+    elif shape == "dorfmann_ogden":
+        # Energies of a spring go with the square of depth; w is that of the last `depth` mm before 2 mm.
+        spent = deepest[below] ** 2 - x[below] ** 2
+        assert np.allclose(lost, told["share"] * np.tanh(spent / (4 - (2 - told["depth"]) ** 2)), atol=1e-4)
     elif shape == "ogden_roxburgh":
         assert np.max(lost) <= told["share"] and np.max(lost) > 0.8 * told["share"]
     else:
@@ -277,6 +281,7 @@ def test_damage_goes_with_the_path_of_loading(shape):
         "exponential": np.exp(-rate * path),
         "kachanov": (1 - 3 * rate * path) ** (1 / 3),
         "saturating": 1 + limit * np.expm1(-rate * path / limit),
+        "logarithmic": 1 - rate * limit * np.log1p(path / limit),
     }[shape]
     assert np.allclose(kept, expected[x > 0.1], atol=1e-6)
 
@@ -290,6 +295,7 @@ def test_the_surface_sinks(shape):
         "linear": s * deepest,
         "saturating": -limit * np.expm1(-s * deepest / limit),
         "yield": s * np.maximum(deepest - limit, 0),
+        "progressive": s * np.maximum(deepest, 0) * np.sqrt(np.maximum(deepest, 0) / 2),
     }[shape]
     assert np.allclose(fine.force_N, 3 * np.maximum(fine.reported_mm - sunk, 0), atol=1e-6)
 
@@ -316,7 +322,12 @@ def test_rates_change_with_depth(shape):
             "depth_dependent_relaxation", shape, pad=pad, motion=Path(1.6).hold(2.0).motion(), seed=seed
         )
         s = told["slope"]
-        factor = {"linear": 1 + 1.6 * s, "exponential": np.exp(1.6 * s), "saturating": 1 + 1.6 * s / 1.4}[shape]
+        factor = {
+            "linear": 1 + 1.6 * s,
+            "exponential": np.exp(1.6 * s),
+            "saturating": 1 + 1.6 * s / 1.4,
+            "free_volume": np.exp(1.6 * s / 1.4),
+        }[shape]
         # Pressed within the first step: the relaxed share follows one exponential from there.
         rate = -np.diff(np.log(fine.at(np.array([0.5, 1.0])) / 4.8 - 0.6)) / 0.5
         assert rate[0] == pytest.approx(2.0 * factor, rel=1e-3)

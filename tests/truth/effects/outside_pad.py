@@ -132,32 +132,6 @@ def rate_stiffening(build: Build, shape: str, size: float) -> dict[str, float]:
 
 
 @njit(cache=True)
-def _pores(depth, u, h, share, diffusivity, back, least):
-    """Pore pressure as a force: p' = s u' − p D/δ², `back` times as fast where p is negative; not below `least`."""
-    p = np.zeros(depth.shape[0])
-    for k in range(1, depth.shape[0]):
-        rate = diffusivity / max(depth[k], 1e-3) ** 2 * (back if p[k - 1] < 0 else 1.0)
-        p[k] = max(p[k - 1] * np.exp(-h * rate) + share * (u[k] - u[k - 1]), least)
-    return p
-
-
-@effect("pore_flow", "sealed", "cavitating")
-def pore_flow(build: Build, shape: str, size: float) -> dict[str, float]:
-    """Fluid is pressed out of a gel: the way out is as long as the contact is wide, so the time goes with depth².
-
-    Biot (1941); Hu, Zhao, Vlassak and Suo (2010) for indenters. Deep, it takes 3 to 12 s; near the surface, none.
-    `sealed`: the skin lies against the pores on the way back, and the fluid returns a tenth as fast. `cavitating`: on
-    the way back the fluid bears next to no tension.
-    """
-    rng = build.rng
-    share, full_s = 0.3 * size * spread(rng, 0.8, 1.25), spread(rng, 3.0, 12.0)
-    diffusivity = build.depth_mm**2 / full_s
-    back, least = (0.1, -1e9) if shape == "sealed" else (1.0, -0.01 * build.force_N)
-    _added(build, lambda t, depth, u: _pores(depth, u, t[1] - t[0], share, diffusivity, back, least))
-    return {"share": share, "diffusivity": diffusivity}
-
-
-@njit(cache=True)
 def _film(depth, h, gap_mm, squeeze_s, refill_s):
     """A film between two layers: its thickness g, squeezed while δ > g, refilled else."""
     over, g = np.zeros(depth.shape[0]), gap_mm
@@ -252,7 +226,7 @@ def nonlinear_relaxation(build: Build, shape: str, size: float) -> dict[str, flo
 
 
 @njit(cache=True)
-def _cushion(u, h, share, opens_N, closes_N, leak_per_s, refill_per_s, least_N):
+def _cushion(u, h, share, opens_N, closes_N, leak_per_s, refill_per_s):
     """Air that bears a share: p' = s u', less the leak from one pressure down to another, more what comes back."""
     p, leaks = np.zeros(u.shape[0]), False
     for k in range(1, u.shape[0]):
@@ -261,25 +235,20 @@ def _cushion(u, h, share, opens_N, closes_N, leak_per_s, refill_per_s, least_N):
         if leaks:
             p[k] *= np.exp(-leak_per_s * h)
         elif p[k] < 0:
-            p[k] = max(p[k] * np.exp(-refill_per_s * h), least_N)
+            p[k] *= np.exp(-refill_per_s * h)
     return p
 
 
-@effect("leak", "relief", "check_valve")
+@effect("leak", "check_valve")
 def leak(build: Build, shape: str, size: float) -> dict[str, float]:
     """A cushion of air bears a share of the load; a lip or a valve opens at a pressure, and shuts at a lower one.
 
-    Shut, nothing flows, whatever the time. `relief`: air comes back at once. `check_valve`: slowly.
+    Shut, nothing flows, whatever the time. What is lost comes back slowly, once the pressure is below the room's.
     """
     rng = build.rng
-    share = min(0.2 * size * spread(rng, 0.8, 1.25), 0.7)
+    share = min(0.25 * size * spread(rng, 0.8, 1.25), 0.7)
     opens = share * build.force_N * float(rng.uniform(0.25, 0.5))
     closes = opens * float(rng.uniform(0.3, 0.6))
-    leak_per_s, refill = spread(rng, 0.3, 2.0), 50.0 if shape == "relief" else spread(rng, 0.1, 0.4)
-    least = -1e9 if shape == "check_valve" else 0.0
-
-    def part(t, depth, u):
-        return _cushion(u, t[1] - t[0], share, opens, closes, leak_per_s, refill, least) - share * u
-
-    _added(build, part)
+    leak_per_s, refill = spread(rng, 0.3, 2.0), spread(rng, 0.1, 0.4)
+    _added(build, lambda t, depth, u: _cushion(u, t[1] - t[0], share, opens, closes, leak_per_s, refill) - share * u)
     return {"share": share, "opens": opens, "closes": closes, "leak": leak_per_s}

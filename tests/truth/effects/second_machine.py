@@ -35,8 +35,7 @@ def _greased(x, gap, closes):
     """A play that closes by itself: each step the share `closes` of what is open."""
     y = x.copy()
     for k in range(1, x.shape[0]):
-        open_mm = min(max(y[k - 1] - x[k], 0.0), gap)
-        y[k] = x[k] + open_mm * (1 - closes)
+        y[k] = x[k] + min(max((y[k - 1] - x[k - 1]) * (1 - closes) + x[k - 1] - x[k], 0.0), gap)
     return y
 
 
