@@ -146,6 +146,8 @@ def refit(
         gradient, matrix = products(e, J)
         return value, gradient - prior * x, matrix + np.diag(prior)
 
+    if not len(x0):  # a bench in air, and nothing in doubt: there is nothing to fit
+        return Fit(structure, x0, chi2(data, structure, x0), np.zeros((0, 0)), True)
     solution = minimise(
         normal, lambda x: chi2(data, structure, x), x0, structure.lower, structure.upper, max_steps, tolerance
     )
