@@ -30,6 +30,14 @@ COMMANDS = {
     "export": "a fitted pad for other programs: C header for real-time loops, or JSON",
     "paper": "remake the paper's figures and tables, and say what comes out of its findings",
     "schema": "print the JSON schema of a protocol, bench or model file",
+    "status": "look at a bench: identity, position, force, lines; moves nothing",
+    "home": "home the axis and bring it inside its travel",
+    "jog": "move the axis by a small step, or by keys, under a force cap",
+    "tare": "read the load cell in air: mean, noise, drift",
+    "release": "bring the motor to a state without force",
+    "calibrate": "scale and sign of the load cell from dead weights, into the bench file",
+    "doctor": "check a bench: rates, noise, hum, steps, delays; what is wrong and what to do",
+    "series": "measure many pads from a list, with rests, and go on tomorrow",
     "emulate": "serve a simulated bench's devices on pseudo-terminals",
 }
 """Commands in the order of `--help`; each is `bench/commands/<name>.py` with `arguments(parser)` and `main(args)`."""
@@ -38,6 +46,15 @@ EPILOG = """\
 PROTOCOL, BENCH and MODEL are files, or names of shipped ones (`padbench check --list`).
 Exit status: 0 done; 1 the answer is no, or the run was stopped (data kept); 2 bad input; 3 recovered with loss;
 70 a defect of padbench. Software limits are no emergency stop: keep one in reach."""
+
+
+class Formatter(argparse.RawDescriptionHelpFormatter):
+    """Leaves room for the names of the commands, which stand further in than argparse counts on."""
+
+    def add_arguments(self, actions: Iterable[argparse.Action]) -> None:
+        """As argparse does, and two columns more."""
+        super().add_arguments(actions)
+        self._action_max_length += 2
 
 
 class Parser(argparse.ArgumentParser):
@@ -78,7 +95,7 @@ def _meant(word: str, known: Iterable[str]) -> str:
 def parser(command: str | None) -> tuple[Parser, Parser]:
     """The parser, and that of the command; only its own arguments are filled in, which keeps `--help` quick."""
     top = Parser(prog="padbench", description="Press a probe into something soft, and know what it is.",
-                 epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter)  # fmt: skip
+                 epilog=EPILOG, formatter_class=Formatter)  # fmt: skip
     top.add_argument("--version", action="store_true", help="print the version")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     named = top

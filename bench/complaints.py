@@ -117,7 +117,8 @@ def _wording(details: Any) -> str:
     if kind == "too_short":
         return "must not be empty" if ctx["min_length"] == 1 else f"needs at least {ctx['min_length']} values"
     if kind == "too_long":
-        return f"takes at most {ctx['max_length']} values, not {ctx['actual_length']}"
+        what = "characters" if isinstance(details.get("input"), str) else "values"
+        return f"takes at most {ctx['max_length']} {what}, not {ctx['actual_length']}"
     if kind == "literal_error":
         return f"must be {ctx['expected'].replace(chr(39), '`')}, not {given}"
     if kind == "value_error":

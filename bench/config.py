@@ -7,7 +7,17 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, PrivateAttr, Tag, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PrivateAttr,
+    Tag,
+    ValidationError,
+    WithJsonSchema,
+    model_validator,
+)
 
 from bench.complaints import FieldError, complaints
 from bench.errors import InputError
@@ -17,6 +27,7 @@ from bench.shipped import find_file, find_shipped, shipped_names
 from bench.yamlfile import Document, read_yaml, validate
 from drivers.regmap import LoadCellMap, MotorMap, load_map
 from drivers.spec import LoadCellSpec, MotorSpec
+from sim.faults import FaultError, fault_schema, read_faults
 
 if TYPE_CHECKING:
     from sim.model import Model
@@ -88,6 +99,9 @@ Surface = Annotated[
 ]
 
 
+SimulatedFault = Annotated[dict[str, Any], WithJsonSchema(fault_schema())]
+
+
 class Simulation(_Part):
     """The truth behind `sim://` ports; nothing but the simulated devices reads it."""
 
@@ -96,7 +110,16 @@ class Simulation(_Part):
     pad: Word = Field(DEFAULT_PAD, description="a model file (relative to the bench file), or a shipped pad's name")
     surface: Surface = Field("random", description="mm, motor frame")
     noise: Noise = Field(default_factory=Noise)
-    faults: list[dict[str, Any]] = Field(default_factory=list)
+    faults: list[SimulatedFault] = Field(default_factory=list, description="what goes wrong (docs/faults.md)")
+
+    @model_validator(mode="after")
+    def _known_faults(self) -> Simulation:
+        try:
+            read_faults(self.faults)
+        except FaultError as error:
+            path: tuple[Key, ...] = ("faults", error.index, error.key) if error.key else ("faults", error.index)
+            raise FieldError(path, error.message, error.cure) from None
+        return self
 
 
 class Bench(_Part):

@@ -1,4 +1,4 @@
-"""A fit as the report shows it: the curves F^e(δ) and g(t) with their doubt, from parameters and covariance."""
+"""A fit as the report shows it: the curves F^e(δ) and g(t) with their doubt, and a discrete fit at other times T."""
 
 from __future__ import annotations
 
@@ -7,18 +7,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.report import Curve, Evidence, FitView
+from bench.report import Curve, Evidence, FitView, OverTimes
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from bench.identify import FitResult
+    from bench.recording.types import Measurement
 
 Array = NDArray[np.float64]
 
 POINTS = 200
+TIMES = (0.5, 1.0, 2.0, 4.0, 8.0)
+"""Sample times at which a discrete fit is shown, over its own."""
 
 
-def fit_view(fit: FitResult) -> FitView:
-    """The first measurement of a fit, its curves and the structures tried."""
+def fit_view(fit: FitResult, over: OverTimes | None = None) -> FitView:
+    """The first measurement of a fit, its curves and the structures tried; `over`: the fit at other sample times."""
     trace = fit.traces[0]
     counted = trace.time_s[trace.counted]
     return FitView(
@@ -30,7 +35,8 @@ def fit_view(fit: FitResult) -> FitView:
         fit_from_s=float(counted[0]),
         fit_to_s=float(counted[-1]),
         elastic=elastic_curve(fit, float(max(t.position_mm.max() for t in fit.traces))),
-        relaxation=relaxation_curve(fit, float(counted[-1] - counted[0])),
+        # a filter that is no relaxation leaves the model without one: a line at 1 would say that nothing relaxes
+        relaxation=relaxation_curve(fit, float(counted[-1] - counted[0])) if fit.physical or not fit.filter else None,
         evidence=[
             Evidence(
                 law=row.label,
@@ -45,7 +51,27 @@ def fit_view(fit: FitResult) -> FitView:
             for row in fit.evidence
         ],
         notes=fit.notes,
+        history=fit.history,
+        over_times=over,
     )
+
+
+def over_times(fit: FitResult, measurements: Sequence[Measurement], **options: object) -> OverTimes | None:
+    """A discrete fit again at shorter and longer sample times, law and order kept; None for the other methods.
+
+    `options`: as given to the fit (`starts`, `ramps`).
+    """
+    from bench.identify.discrete import over_sample_times
+    from bench.identify.discrete.over_time import LAW
+
+    if fit.filter is None:
+        return None
+    T = float(fit.filter["sample_time_s"])
+    found = over_sample_times(measurements, fit.method, fit.law, fit.order, [share * T for share in TIMES],
+                              contact=fit.contact, degree=fit.degree, **options)  # fmt: skip
+    rates = -np.sort(-np.where(found.physical[:, None], found.rates.real, np.nan), axis=1)
+    numbers = {name: y for name, y in found.numbers.items() if name in LAW or name.startswith("alpha_")}
+    return OverTimes(found.T, numbers, rates, found.physical, T, found.refused)
 
 
 def elastic_curve(fit: FitResult, deepest_mm: float) -> Curve | None:

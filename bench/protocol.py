@@ -31,7 +31,7 @@ def _as_word(value: Any) -> Any:
 
 
 Word = Annotated[str, BeforeValidator(_as_word, json_schema_input_type=str | float)]
-Name = Annotated[Word, Field(pattern=r"^\w[\w .\-]*$")]
+Name = Annotated[Word, Field(pattern=r"^\w[\w .\-]*$", max_length=100)]
 """What may become part of a folder's name."""
 
 

@@ -16,7 +16,11 @@ STREAM_HZ = 1000.0
 """What a streamed motor is asked for unless the bench file or the protocol says otherwise."""
 
 _ORCA_BITS, _ORCA_BAUD = 28 * 11, 19200
-_LINE_BITS, _LINE_BAUD, _LINE_HZ = 21 * 10, 115200, 600.0
+_LINES = {"dad141": (21 * 10, 115200, 600.0), "mt_sics": (18 * 10, 9600, 100.0)}
+"""Load cells that send lines by themselves: bits of a line, baud rate and lines a second where the file gives none.
+
+How often an MT-SICS device sends differs by model: `rate` of the bench file says it better.
+"""
 
 
 def streams(bench: Bench) -> bool:
@@ -46,8 +50,9 @@ def motor_rate_Hz(bench: Bench, asked_Hz: float | None = None) -> float:
 def force_rate_Hz(bench: Bench, asked_Hz: float | None = None) -> float:
     """Force samples a second to expect of the load cell."""
     spec = bench.load_cell
-    if spec.driver == "dad141":
-        most = min(_LINE_HZ, (spec.baudrate or _LINE_BAUD) / _LINE_BITS)
+    if spec.driver in _LINES:
+        bits, baudrate, usual_Hz = _LINES[spec.driver]
+        most = min(usual_Hz if spec.rate is None else max(usual_Hz, spec.rate), (spec.baudrate or baudrate) / bits)
         return min(asked_Hz or spec.rate or most, most)
     usual, exchange_s = _polled(bench, "load_cell")
     return min(asked_Hz or spec.rate or usual, 1.0 / exchange_s)
@@ -60,7 +65,11 @@ def force_latency_s(bench: Bench, asked_Hz: float | None = None) -> float:
     a streamed one takes the stop with the next frame; one that is polled ends the exchange under way first.
     """
     spec = bench.load_cell
-    reply_s = _LINE_BITS / (spec.baudrate or _LINE_BAUD) if spec.driver == "dad141" else _polled(bench, "load_cell")[1]
+    if spec.driver in _LINES:
+        bits, baudrate, _ = _LINES[spec.driver]
+        reply_s = bits / (spec.baudrate or baudrate)
+    else:
+        reply_s = _polled(bench, "load_cell")[1]
     turns = 1.0 if streams(bench) else 2.0
     sample_s = 1.0 / force_rate_Hz(bench, asked_Hz) + reply_s
     return sample_s + max(0.0, bench.timing.force_delay) + turns / motor_rate_Hz(bench)

@@ -60,6 +60,19 @@ def open_load_cell(spec: LoadCellSpec, clock: Clock, name: str = "load_cell") ->
             decimals=spec.decimals,
             strict=spec.checksum == "strict",
         )
+    if spec.driver == "mt_sics":
+        from drivers import mt_sics
+
+        settings = LinkMap(baudrate=spec.baudrate or mt_sics.DEFAULT_BAUDRATE, parity=spec.parity or "N")
+        return mt_sics.MtSics(
+            _link(name, spec.port, clock, settings, 1e-6 * (spec.gap_us or 0)),
+            name=name,
+            unit=spec.unit,
+            newtons_per_unit=spec.newtons_per_unit,
+            capacity_N=spec.capacity,
+            mode=spec.mode,
+            rate_hz=spec.rate,
+        )
     from drivers.registers_cell import RegisterLoadCell
 
     device: LoadCellMap = _map(name, spec, "load_cell")
@@ -91,12 +104,11 @@ def _register_link(name: str, spec: MotorSpec | LoadCellSpec, clock: Clock, devi
     )
     gap_us = device.link.gap_us if spec.gap_us is None else spec.gap_us
     if settings.transport == "tcp":
-        gap_s = 1e-6 * (gap_us or 0)
-    else:
-        from drivers.modbus import rtu_gap_s
+        return _link(name, spec.port, clock, settings, 1e-6 * (gap_us or 0))
+    from drivers.modbus import rtu_gap_s
 
-        gap_s = rtu_gap_s(settings.baudrate, _bits_per_byte(settings)) if gap_us is None else 1e-6 * gap_us
-    return _link(name, spec.port, clock, settings, gap_s)
+    gap_s = rtu_gap_s(settings.baudrate, _bits_per_byte(settings)) if gap_us is None else 1e-6 * gap_us
+    return _line_of_many(name, spec.port, clock, settings, gap_s)
 
 
 def _link(name: str, url: str, clock: Clock, settings: LinkMap, gap_s: float) -> Link:
@@ -110,6 +122,14 @@ def _link(name: str, url: str, clock: Clock, settings: LinkMap, gap_s: float) ->
         bits_per_byte=_bits_per_byte(settings),
         gap_s=gap_s,
     )
+
+
+def _line_of_many(name: str, url: str, clock: Clock, settings: LinkMap, gap_s: float) -> Link:
+    """A link on a line that other devices of register maps may be on too."""
+    from drivers.bus import bus_link
+
+    bits = _bits_per_byte(settings)
+    return bus_link(name, url, clock, settings, baudrate=settings.baudrate, bits_per_byte=bits, gap_s=gap_s)
 
 
 def _bits_per_byte(settings: LinkMap) -> int:

@@ -15,6 +15,7 @@ from typing import Any, Literal
 from drivers.dad141_filter import delay_s, output_interval_s
 from drivers.dad141_lines import FULL_SCALE, LINE_SIZE, Combined, LineCutter, checksum, parse_combined
 from drivers.errors import CrcError, DeviceTimeout, DriverError, ExceptionReply, Overload, UnexpectedReply
+from drivers.lines import first_line
 from drivers.loadcell import ForceSample, LoadCellIdentity
 from drivers.timing import LineTimer
 from drivers.wire import Exchange, Link, Pause, Steps
@@ -114,7 +115,8 @@ class Dad141:
             match = yield self._ask(command, _SETTING.pattern)
         except (DeviceTimeout, ExceptionReply):
             return None
-        return int(match[2])
+        # What is no setting is not told: two to the power of it would be beyond all bounds.
+        return int(match[2]) if len(match[2]) <= 9 and int(match[2]) < 100 else None
 
     def start(self) -> Steps[None]:
         """Continuous: have the device send by itself, wait for the first good line. Poll: begin with the next call."""
@@ -168,8 +170,9 @@ class Dad141:
         return samples
 
     def next_poll_s(self) -> float | None:
-        """When the next poll is due, or None when lines come by themselves."""
-        return self._next_poll_s
+        """When the next poll is due; None when lines come by themselves, or the last poll is unanswered."""
+        waiting = self._poll is not None and not self._poll.done
+        return None if waiting else self._next_poll_s
 
     def latency_s(self) -> float:
         """Interval, wire and filter: the age of the newest sample just before the next one comes."""
@@ -270,17 +273,7 @@ class Dad141:
     ) -> Exchange[Any]:
         """A command and the first line that answers it; lines of a stream that still come are skipped."""
 
-        def length(buffer: bytearray) -> int:
-            while buffer:
-                end = next((index for index, byte in enumerate(buffer) if byte in b"\r\n"), None)
-                if end is None:
-                    return 0
-                line = bytes(buffer[:end])
-                after = end + 2 if buffer[end : end + 2] == b"\r\n" else end + 1
-                if line.endswith(b"ERR") or pattern.search(line):
-                    return after
-                del buffer[:after]
-            return 0
+        length = first_line(lambda line: line.endswith(b"ERR") or pattern.search(line))
 
         def parse_or_refuse(frame: bytes, sent_s: float, received_s: float) -> Any:
             if frame.strip(b"\r\n").endswith(b"ERR"):

@@ -59,5 +59,5 @@ class LoadCell(Protocol):
         ...
 
     def next_poll_s(self) -> float | None:
-        """When `samples` wants to be called again to submit a poll (bench clock), or None when it only listens."""
+        """When `samples` wants to be called again to submit a poll (bench clock); None while it waits for bytes."""
         ...

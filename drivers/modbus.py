@@ -107,6 +107,10 @@ class ModbusClient:
         """Registers turned into a value; `convert(registers, time_s, received_s)` gets the time they were read at."""
 
         def convert_reply(reply: ModbusPDU, time_s: float, received_s: float) -> T:
+            if len(reply.registers) != count:  # its byte count says less than the frame holds
+                raise UnexpectedReply(
+                    self.link.name, f"{len(reply.registers)} registers came where {count} were asked for"
+                )
             return convert(list(reply.registers), time_s, received_s)
 
         request = _READS[table](address=address, count=count)
@@ -124,6 +128,8 @@ class ModbusClient:
         """Coils (function 01) or discrete inputs (function 02)."""
 
         def convert(reply: ModbusPDU, _time_s: float, _received_s: float) -> list[bool]:
+            if len(reply.bits) < count:
+                raise UnexpectedReply(self.link.name, f"{len(reply.bits)} bits came where {count} were asked for")
             return list(reply.bits)[:count]
 
         request = _BIT_READS[table](address=address, count=count)
@@ -155,6 +161,10 @@ class ModbusClient:
         """Write, then read, in one message (function 23)."""
 
         def convert(reply: ModbusPDU, _time_s: float, _received_s: float) -> list[int]:
+            if len(reply.registers) != read_count:
+                raise UnexpectedReply(
+                    self.link.name, f"{len(reply.registers)} registers came where {read_count} were asked"
+                )
             return list(reply.registers)
 
         request = ReadWriteMultipleRegistersRequest(
@@ -240,6 +250,9 @@ class ModbusClient:
             del buffer[: min(starts)]
             return length(buffer)
         if len(buffer) >= 5 and not compute_crc(bytes(buffer[:-2])) ^ int.from_bytes(buffer[-2:], "big"):
+            if self.link.shared:
+                buffer.clear()  # another device on the line, late
+                return 0
             raise UnexpectedReply(
                 self.link.name,
                 f"a reply from address {buffer[0]}, function {buffer[1]:#04x}, where address {head[0]}, function "

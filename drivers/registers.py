@@ -152,6 +152,22 @@ class RegisterMotor:
             "acceleration": acceleration_mm_s2,
         }
 
+    def perform(self, action: str, **variables: float) -> Steps[None]:
+        """One of the map's `actions`, with its variables in base units; `target` in the motor frame, mm.
+
+        For what a bench does not need and a device can do (an alarm's reset, a push with a limited current). Raises
+        `DriverError` for an action or variables that the map does not have, and as any steps do.
+        """
+        known = self.map.actions
+        if action not in known:
+            raise DriverError(self.name, f"the register map has no action {action!r} ({', '.join(known) or 'none'})")
+        takes = known[action].takes
+        if set(takes) != variables.keys():
+            raise DriverError(self.name, f"the action {action!r} takes {', '.join(takes) or 'nothing'}, all of them")
+        if "target" in variables:
+            variables["target"] *= self.direction
+        yield from self._sequencer.run(known[action].steps, {**self.map.constants, **variables})
+
     def stream(self, position_mm: float) -> Exchange[MotorSample]:
         """Not with this motor: it makes its own profiles; raises `DriverError`."""
         raise DriverError(self.name, "this motor makes its own profiles; it follows no stream of positions")
@@ -232,9 +248,10 @@ class RegisterMotor:
         )
 
     def fault_names(self, fault: int) -> tuple[str, ...]:
-        """The map's fault bits by name, and the device's own code."""
+        """The map's fault bits by name, and the device's own code with its meaning, where the map has it."""
         names = [bit for index, bit in enumerate(self.map.faults) if fault >> FAULT_BIT_SHIFT + index & 1]
         code = fault & 0xFFFF_FFFF
         if code:
-            names.append(f"code {code:#06x}")
+            meaning = self.map.codes.get(code)
+            names.append(f"code {code:#06x}" + (f" ({meaning})" if meaning else ""))
         return tuple(names)

@@ -96,8 +96,9 @@ class RegisterLoadCell:
         return 1.0 / self.rate_hz + self.link.wire_s(8 + 5 + 2 * self._block.count) + self.map.reply.turnaround_s
 
     def next_poll_s(self) -> float | None:
-        """When the next poll is due."""
-        return self._next_poll_s
+        """When the next poll is due; None while the last one is unanswered, as its answer wakes whoever waits."""
+        waiting = self._poll is not None and not self._poll.done
+        return None if waiting else self._next_poll_s
 
     def _exchange(self) -> Exchange[ForceSample]:
         return self._modbus.sample_registers(

@@ -6,6 +6,7 @@ A map says how the device is reached (`link`, `reply`), which registers one poll
 
 - values `position` (mm), `force` (of a motor, N), `fault` (a word, 0 = none); of a load cell `gross`;
 - bits `servo_on`, `homed`, `moving`;
+- `codes`: what the numbers of `fault` mean;
 - in steps that write, `from:` one of `target`, `speed`, `acceleration`, or a name from `constants`.
 
 See `drivers/maps/iai.yaml` for one in full.
@@ -13,6 +14,7 @@ See `drivers/maps/iai.yaml` for one in full.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, field_validator, model_validator
@@ -31,8 +33,8 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-def _known_unit(unit: str) -> str:
-    if unit not in UNITS:
+def _known_unit(unit: object) -> str:
+    if not isinstance(unit, str) or unit not in UNITS:
         raise ValueError(f"unknown unit {unit!r}; there are {', '.join(name for name in UNITS if name)}")
     return unit
 
@@ -76,13 +78,17 @@ class Block(_Part):
 
 
 class Value(_Part):
-    """A number in registers: raw · scale, in `unit`."""
+    """A number in registers: raw · scale, in `unit`.
+
+    `negative`: the register has the number without its sign, and it is negative where this bit is on.
+    """
 
     address: Address
     table: Literal["holding", "input"] = "holding"
     type: NumberType = "u16"
     scale: FiniteFloat = 1.0
     unit: Unit = ""
+    negative: str | None = None
 
     @property
     def words(self) -> int:
@@ -136,28 +142,36 @@ class Written(_Part):
         return self.scale * UNITS[self.unit]
 
 
-class WriteCoil(_Part):
-    """Write one coil. `edge`: the device acts on the change, so that it is never sent twice."""
+class _Write(_Part):
+    """What all writes have.
+
+    `edge`: the device acts on the change, so that it is never sent twice. `when`: only where these bits, read just
+    before, are as said.
+    """
+
+    edge: bool = False
+    when: dict[str, bool] = {}
+
+
+class WriteCoil(_Write):
+    """Write one coil."""
 
     coil: Address
     to: bool
-    edge: bool = False
 
 
-class WriteRegister(_Part):
+class WriteRegister(_Write):
     """Write one register by function 06."""
 
     register_: Annotated[Address, Field(alias="register")]
     to: Annotated[int, Field(ge=0, le=0xFFFF)]
-    edge: bool = False
 
 
-class WriteBlock(_Part):
+class WriteBlock(_Write):
     """Write neighbouring registers in one message, by function 16."""
 
     registers: Address
     fields: Annotated[list[Written], Field(min_length=1)]
-    edge: bool = False
 
 
 class Wait(_Part):
@@ -216,6 +230,13 @@ Step = Annotated[AnyStep, BeforeValidator(_step)]
 Sequence = list[Step]
 
 
+class Action(_Part):
+    """What a device can do beyond the driver's verbs (`RegisterMotor.perform`): steps, and the variables they take."""
+
+    takes: list[str] = []
+    steps: Annotated[Sequence, Field(min_length=1)]
+
+
 class _DeviceMap(_Part):
     name: str
     title: str = ""
@@ -246,6 +267,14 @@ class _DeviceMap(_Part):
         for name, bit in self.bits.items():
             if self.block_of(bit) is None:
                 raise ValueError(f"bit {name!r} lies in no block")
+        for name, value in self.values.items():
+            if value.negative is None:
+                continue
+            self._must_know([value.negative], self.bits, f"values.{name}")
+            if self.block_of(value) is None or self.block_of(self.bits[value.negative]) != self.block_of(value):
+                raise ValueError(f"value {name!r} and the bit of its sign must lie in one block")
+            if name in self.identify:
+                raise ValueError(f"value {name!r} is read by itself under identify, without the bit of its sign")
         self._must_know(self.identify, self.values, "identify")
         return self
 
@@ -255,6 +284,7 @@ class MotorMap(_DeviceMap):
 
     device: Literal["motor"]
     faults: list[str] = []
+    codes: dict[int, str] = {}
     clamps: dict[Literal["speed", "acceleration", "force", "position_low", "position_high", "watchdog"], str] = {}
     constants: dict[str, FiniteFloat] = {}
     connect: Sequence = []
@@ -264,6 +294,7 @@ class MotorMap(_DeviceMap):
     stop: Sequence
     hold: Sequence
     release: Sequence
+    actions: dict[str, Action] = {}
 
     @field_validator("constants")
     @classmethod
@@ -285,15 +316,24 @@ class MotorMap(_DeviceMap):
         self._must_know(["servo_on"], self.bits, "bits")
         self._must_know(self.faults, self.bits, "faults")
         self._must_know(list(self.clamps.values()), self.values, "clamps")
+        signed = [name for name in self.clamps.values() if self.values[name].negative is not None]
+        if signed:
+            raise ValueError(f"clamps: {signed[0]!r} is written as it is, and cannot have its sign in a bit")
         for verb in ("connect", "energise", "home", "move", "stop", "hold", "release"):
             for number, step in enumerate(getattr(self, verb)):
-                self._check_step(step, f"{verb}[{number}]", verb)
+                self._check_step(step, f"{verb}[{number}]", MOVE_VARIABLES if verb == "move" else ())
+        for name, action in self.actions.items():
+            clash = self.constants.keys() & set(action.takes)
+            if clash:
+                raise ValueError(f"actions.{name}: {', '.join(sorted(clash))} is a constant already")
+            for number, step in enumerate(action.steps):
+                self._check_step(step, f"actions.{name}[{number}]", action.takes)
         return self
 
-    def _check_step(self, step: AnyStep, where: str, verb: str) -> None:
-        variables: dict[str, Any] = dict(self.constants)
-        if verb == "move":
-            variables.update(dict.fromkeys(MOVE_VARIABLES))
+    def _check_step(self, step: AnyStep, where: str, given: Iterable[str]) -> None:
+        variables: dict[str, Any] = {**self.constants, **dict.fromkeys(given)}
+        if isinstance(step, _Write):
+            self._must_know(list(step.when), self.bits, where)
         if isinstance(step, Wait):
             self._must_know(list(step.wait), self.bits, where)
         elif isinstance(step, Check):
@@ -323,6 +363,9 @@ class LoadCellMap(_DeviceMap):
         if gross.unit:
             raise ValueError("value 'gross' has no unit here: it is the bench file's")
         self._must_know([*self.flags, *self.overload], self.bits, "flags, overload")
+        for name in (*self.flags, *self.overload):
+            if self.block_of(self.bits[name]) != self.block_of(gross):
+                raise ValueError(f"bit {name!r} must lie in the block of 'gross', to be of the same moment")
         return self
 
 

@@ -43,7 +43,9 @@ class Signals:
     def number(self, value: Value, block: Block, words: Words) -> float:
         """A value in base units (mm, mm/s, mm/s², N, s; or its plain number), out of the block it lies in."""
         at = value.address - block.address
-        return decode(words[at : at + value.words], value.type, self.map.word_order) * value.factor
+        number = decode(words[at : at + value.words], value.type, self.map.word_order) * value.factor
+        # The bit of the sign lies in the same block, and was taken from the same words.
+        return -number if value.negative is not None and self.bits[value.negative] else number
 
     def raw(self, value: Value, block: Block, words: Words) -> int:
         """A value's whole number as it is in the device."""
@@ -104,6 +106,10 @@ class Sequencer:
         (a device with a fault must still be stopped and released); with `DeviceTimeout` when time is up.
         """
         for step in steps:
+            if isinstance(step, (WriteCoil, WriteRegister, WriteBlock)) and step.when:
+                yield from self.signals.refresh(step.when)
+                if any(self.signals.bits[bit] != state for bit, state in step.when.items()):
+                    continue
             if isinstance(step, WriteCoil):
                 yield self.modbus.write_coil(step.coil, step.to, repeatable=not step.edge)
             elif isinstance(step, WriteRegister):

@@ -133,7 +133,7 @@ class LoadCellSpec(_Spec):
     @classmethod
     def built_in(cls) -> tuple[str, ...]:
         """Drivers that are code."""
-        return ("dad141",)
+        return ("dad141", "mt_sics")
 
     @classmethod
     def drivers(cls) -> tuple[str, ...]:

@@ -132,8 +132,11 @@ class Link:
 
     `bits_per_byte` and `baudrate` give the wire time (`wire_s`), 0 baud for ports without one (TCP).
     `gap_s` is the silence the device wants between a reply and the next request.
+    `shared`: other devices' replies may come on this line.
     Bytes that belong to no exchange go to `listener(data, received_s)` if one is set, else they count as stray.
     """
+
+    shared = False
 
     def __init__(
         self,
@@ -165,6 +168,8 @@ class Link:
         self._free_at_s = 0.0
         self._quiet_limit_s = 0.0
         self._check_at_s = 0.0
+        self._asked_s = 0.0
+        self._gave_up = False
         self._read, self._write = raw_io(port)
 
     def wire_s(self, byte_count: int) -> float:
@@ -236,7 +241,7 @@ class Link:
     def _take(self, data: bytes, now: float) -> None:
         self.traffic.bytes_in += len(data)
         exchange = self._current
-        if exchange is None:
+        if exchange is None or now < self._asked_s:
             self._stray(data, now)
             return
         self._buffer += data
@@ -287,6 +292,7 @@ class Link:
         assert exchange is not None
         if isinstance(error, DeviceTimeout):
             self.traffic.timeouts += 1
+            self._gave_up = self._asked_s == 0.0
         else:
             self.traffic.bad_frames += 1
         self.traffic.stray_bytes += len(self._buffer)
@@ -322,6 +328,9 @@ class Link:
             self._free_at_s = now + self.wire_s(len(exchange.request)) + self.gap_s
             return
         self._current = exchange
+        # What comes after a time-out before this request can have left the wire answers the one that was given up.
+        self._asked_s = now + self.wire_s(len(exchange.request)) if self._gave_up else 0.0
+        self._gave_up = False
         self._quiet_limit_s = 0.0
         self._buffer.clear()
         self._deadline_s = now + exchange.timeout_s + self.wire_s(len(exchange.request))

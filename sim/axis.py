@@ -99,6 +99,8 @@ class BenchPlant:
         self._axis[a.POSITION] = self._axis[a.SETPOINT] = position_mm
         force = self.plant.step(0.0, position_mm - surface_mm)
         self._axis[a.FORCE] = force
+        self._ceiling_N = self._limit_N = settings.max_force_N
+        self._jammed = self._clamped = False
         self._history = np.zeros((8192, a.HISTORY))
         self._history[0, a.H_POSITION] = self._history[0, a.H_SETPOINT] = position_mm
         self._history[0, a.H_FORCE] = force
@@ -231,11 +233,30 @@ class BenchPlant:
         """What the drive can push from now on, N; never more than `settings.max_force_N`."""
         if not force_N >= 0.0:
             raise ValueError("a force limit is 0 or more")
-        self._s[a.MAX_FORCE] = min(force_N, self.settings.max_force_N)
+        self._limit_N = force_N
+        self._s[a.MAX_FORCE] = min(force_N, self._ceiling_N)
 
     def brake(self, on: bool) -> None:
         """Clamp the mover, or let it go."""
-        self._axis[a.BRAKED] = 1.0 if on else 0.0
+        self._clamped = on
+        self._axis[a.BRAKED] = 1.0 if on or self._jammed else 0.0
+
+    # what goes wrong with it
+
+    def weaken(self, force_N: float) -> None:
+        """The drive can push no more than this from now on (N), whatever it is allowed."""
+        self._ceiling_N = min(force_N, self.settings.max_force_N)
+        self._s[a.MAX_FORCE] = min(self._limit_N, self._ceiling_N)
+
+    def jam(self, on: bool) -> None:
+        """The mover sticks where it is, or comes free again."""
+        self._jammed = on
+        self._axis[a.BRAKED] = 1.0 if on or self._clamped else 0.0
+
+    def obstruct(self, position_mm: float | None) -> None:
+        """Something stands in the way: the mover gets no further into the pad than here; None: it is gone."""
+        high_mm = self.settings.stroke_mm[1]
+        self._s[a.HIGH] = high_mm if position_mm is None else min(position_mm, high_mm)
 
     # what it says
 

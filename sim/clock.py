@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import heapq
+import math
 import select
 import sys
 import time
@@ -91,6 +92,25 @@ class SimClock:
         """A host has read such a frame to its end."""
         self._unread -= 1
 
+    def stall(self, seconds: float) -> None:
+        """The host does nothing for so long, while everything else goes on. Called from an event."""
+        if self.wall:
+            time.sleep(seconds)
+            return
+        until_s = self._now_s + seconds
+        events = self._events
+        while events and events[0][0] <= until_s:
+            at_s, _, event = heapq.heappop(events)
+            if event.callback is not None:
+                self._now_s = max(self._now_s, at_s)
+                event.callback(at_s)
+        self._now_s = max(self._now_s, until_s)
+        self._arrival = True
+
+    def wake(self) -> None:
+        """Have a waiting caller look, although nothing came. Called from an event."""
+        self._arrival = True
+
     def run_due(self) -> None:
         """Run the events that are due by now; the wall clock's ports do so before they are read."""
         self._run_until(self.now())
@@ -157,6 +177,43 @@ class SimClock:
                 time.sleep(sleep_s)
             if now_s >= until_s:
                 return ()
+
+
+class SteppedClock(SimClock):
+    """What the host sees of a bench's clock that is set forward or back while the run goes on.
+
+    The devices live on `inner`; `step_s` is by how much the host's is ahead of it.
+    """
+
+    def __init__(self, inner: SimClock) -> None:
+        super().__init__(False)
+        self.wall = inner.wall
+        self.epoch_ns = inner.epoch_ns
+        self.inner = inner
+        self.step_s = 0.0
+
+    def now(self) -> float:
+        """Seconds since the clock was made, as the host has them."""
+        return self.inner.now() + self.step_s
+
+    def schedule(self, at_s: float, callback: Callable[[float], None]) -> Event:
+        """On the devices' clock, at the time that the host means now."""
+        return self.inner.schedule(at_s - self.step_s, callback)
+
+    def run_due(self) -> None:
+        """As on the inner clock."""
+        self.inner.run_due()
+
+    def next_event_s(self) -> float:
+        """As the host counts."""
+        return self.inner.next_event_s() + self.step_s
+
+    def wait(self, ports: Sequence[Any], until_s: float) -> Sequence[Any]:
+        """As on the inner clock, until the host's clock shows `until_s` unless it is set meanwhile."""
+        inner_s = until_s - self.step_s
+        while inner_s + self.step_s < until_s:  # rounding: who waits must not find himself a hair before his time
+            inner_s = math.nextafter(inner_s, math.inf)
+        return self.inner.wait(ports, inner_s)
 
 
 def _fine_timers() -> None:

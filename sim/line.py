@@ -8,10 +8,16 @@ Where host and device disagree about baudrate or parity, both receive garbage, a
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeAlias
 
 from sim.clock import SimClock
+
+Pieces: TypeAlias = Sequence[tuple[bytes, float]]
+"""What becomes of bytes on their way: pieces in order, each with the seconds it comes late."""
+
+Tamper: TypeAlias = Callable[[bytes, float], Pieces]
+"""Says what becomes of bytes that start on their way at a time; a fault of the line."""
 
 
 class Receiver(Protocol):
@@ -73,6 +79,11 @@ class Line:
         self.collisions = 0
         self.host_baudrate: int | None = None
         self.host_parity: str | None = None
+        self.gone: OSError | None = None
+        """What reading and writing meet while the port is unplugged."""
+        self.refusal: str | None = None
+        """Why the port cannot be opened, if it cannot."""
+        self._tampers: tuple[list[Tamper], list[Tamper]] = ([], [])
         self._to_host: deque[_Chunk] = deque()
         self._to_device_free_s = 0.0
         self._to_device_start_s = 0.0
@@ -98,12 +109,44 @@ class Line:
         self.host_byte_s = byte_time_s(baudrate, parity) if self.baudrate else 0.0
         self._match = not self.baudrate or (baudrate == self.baudrate and parity == self.parity)
 
+    # -- faults ------------------------------------------------------------------------------------------------
+
+    def tamper(self, tamper: Tamper, to_device: bool) -> None:
+        """Let a fault change what passes in one direction, behind the faults that do so already."""
+        self._tampers[to_device].append(tamper)
+
+    def _tampered(self, data: bytes, at_s: float, to_device: bool) -> Pieces:
+        pieces: Pieces = ((data, 0.0),)
+        for tamper in self._tampers[to_device]:
+            pieces = [
+                (part, late_s + more_s)
+                for piece, late_s in pieces
+                for part, more_s in tamper(piece, at_s + late_s)
+                if part
+            ]
+        return pieces
+
+    def unplug(self, error: OSError | None) -> None:
+        """The port is pulled out: whoever uses it meets the error; None: it is there again."""
+        self.gone = error
+        self.refusal = None if error is None else error.strerror
+        self.clock.arrived()  # a port in error wakes who waits for it
+
     # -- host to device ----------------------------------------------------------------------------------------
 
     def host_write(self, data: bytes, late_s: float = 0.0) -> None:
         """Put bytes on the wire now (so long ago as they come `late_s`), behind those that are still leaving."""
         if not data:
             return
+        if self.gone is not None:
+            raise self.gone
+        if self._tampers[True]:
+            for piece, more_s in self._tampered(data, self.clock.now(), True):
+                self._host_send(piece, late_s - more_s)
+            return
+        self._host_send(data, late_s)
+
+    def _host_send(self, data: bytes, late_s: float) -> None:
         now_s = self.clock.now() - late_s
         start_s = self._to_device_free_s if self._to_device_free_s > now_s else now_s
         end_s = start_s + len(data) * self.host_byte_s
@@ -127,6 +170,14 @@ class Line:
 
     def device_write(self, data: bytes, at_s: float) -> float:
         """The device starts to send at `at_s`, behind what it is sending; returns when its last byte has left."""
+        if self._tampers[False]:
+            end_s = max(self._to_host_free_s, at_s) + len(data) * self.byte_s
+            for piece, late_s in self._tampered(data, at_s, False):
+                self._device_send(piece, at_s + late_s)
+            return end_s
+        return self._device_send(data, at_s)
+
+    def _device_send(self, data: bytes, at_s: float) -> float:
         start_s = self._to_host_free_s if self._to_host_free_s > at_s else at_s
         end_s = start_s + len(data) * self.byte_s
         self._to_host_free_s = end_s
@@ -149,6 +200,8 @@ class Line:
 
     def available(self) -> int:
         """Bytes that have arrived at the host and were not read yet."""
+        if self.gone is not None:
+            raise self.gone
         if self.clock.wall:
             self.clock.run_due()
         chunks = self._to_host
@@ -165,11 +218,15 @@ class Line:
 
     def frame_arrived(self) -> bool:
         """Whether something the device sent in one piece has arrived to its last byte."""
+        if self.gone is not None:
+            return True
         chunks = self._to_host
         return bool(chunks) and chunks[0].end_s <= self.clock.now()
 
     def host_read(self, size: int) -> bytes:
         """At most `size` of the bytes that have arrived."""
+        if self.gone is not None:
+            raise self.gone
         if self.clock.wall:
             self.clock.run_due()
         return self._take(size, self.clock.now())

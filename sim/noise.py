@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-PURPOSES = ("surface", "position", "force")
+PURPOSES = ("surface", "position", "force", "faults")
 """Order matters: a purpose's place is its spawn key. New ones are appended."""
 
 _BLOCK = 512
 
 
-def generator(seed: int, purpose: str) -> np.random.Generator:
-    """The generator of one purpose of a bench; the same seed and purpose give the same numbers always."""
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PURPOSES.index(purpose),)))
+def generator(seed: int, purpose: str, *place: int) -> np.random.Generator:
+    """The generator of one purpose of a bench; the same seed, purpose and place give the same numbers always."""
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(PURPOSES.index(purpose), *place)))
 
 
 class GaussianNoise:

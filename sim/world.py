@@ -6,16 +6,20 @@ the bench file.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 from urllib.parse import urlsplit
 
+import numpy as np
 import serial
 
 from sim.axis import BenchPlant, ServoSettings
-from sim.clock import SimClock
+from sim.clock import SimClock, SteppedClock
 from sim.devices import load_cell_device, motor_device
+from sim.faults import install, read_faults
+from sim.faults.host import own_acts
+from sim.faults.site import Site
 from sim.line import Line
 from sim.model import Model
 from sim.noise import GaussianNoise, generator
@@ -33,7 +37,7 @@ class WorldSettings:
     load cell. `motor` and `load_cell` are those parts of the bench file as dicts (`driver`, `address`, `baudrate`,
     `parity`, `gap_us`, `direction`, `stroke`, `moving_mass`, `orientation`, `max_speed`, `max_acceleration`, `map`;
     `driver`, `baudrate`, `address`, `unit`, `scale`, `sign`, `capacity`, `decimals`, `map`); `map` is a register
-    map's content. `faults` must be empty: none is simulated yet.
+    map's content. `faults` are entries of a bench file's `simulation.faults` (see `sim.faults`).
     """
 
     name: str
@@ -67,14 +71,17 @@ class World:
     """A running simulated bench. The same settings make the same bytes, for the same questions at the same times.
 
     Starts with the axis at motor position 0 (or the end of the stroke next to it), the probe in air.
-    Raises ValueError for a driver that has no simulated device, and for faults.
+    Raises ValueError for a driver that has no simulated device, and `FaultError` for a fault that cannot be.
+    `clock` is the host's; the devices live on `true_clock`, which is the same one but where a fault sets the host's.
     """
 
     def __init__(self, settings: WorldSettings) -> None:
-        if settings.faults:
-            raise ValueError("faults are not simulated yet; leave 'faults' empty")
+        faults = read_faults(settings.faults)
         self.settings = settings
-        self.clock = SimClock(wall=settings.clock == "wall")
+        self.true_clock = SimClock(wall=settings.clock == "wall")
+        self.clock: SimClock = self.true_clock
+        if any(fault.kind.name == "clock_step" for fault in faults):
+            self.clock = SteppedClock(self.true_clock)
         motor = settings.motor
         low_mm, high_mm = (float(end) for end in motor["stroke"])
         start_mm = min(max(0.0, low_mm), high_mm)
@@ -83,16 +90,27 @@ class World:
         self.endpoints: dict[str, Endpoint] = {}
         position_noise = GaussianNoise(generator(settings.seed, "position"), settings.noise_position_mm)
         force_noise = GaussianNoise(generator(settings.seed, "force"), settings.noise_force_N)
-        self._connect("motor", *motor_device(motor, self.clock, self.plant, position_noise))
+        self._connect("motor", *motor_device(motor, self.true_clock, self.plant, position_noise))
         self._connect(
             "load_cell",
-            *load_cell_device(settings.load_cell, self.clock, self.plant, force_noise, settings.drift_force_N_s),
+            *load_cell_device(settings.load_cell, self.true_clock, self.plant, force_noise, settings.drift_force_N_s),
         )
+        self.host_acts: dict[str, Callable[[], None]] = dict(own_acts())
+        self.site = Site(self)
+        install(faults, self.site)
 
     @property
     def devices(self) -> dict[str, object]:
         """The devices by their keys in the bench file."""
         return {key: endpoint.device for key, endpoint in self.endpoints.items()}
+
+    def fault_generator(self, index: int) -> np.random.Generator:
+        """The random numbers of the fault at a place in the list; nothing else draws from them."""
+        return generator(self.settings.seed, "faults", index)
+
+    def step_begins(self, name: str) -> None:
+        """To be told by the run: the step of that name begins. Faults that name a step wait for it."""
+        self.site.step_begins(name)
 
     def truth(self) -> dict[str, Any]:
         """What a fit must not see: the pad, where its surface is, noise, seed. Plain values, for a record."""
@@ -158,6 +176,9 @@ def lookup(url: str) -> Endpoint:
         there_are = [f"sim://{name}/{key}" for name, world in _worlds.items() for key in world.endpoints]
         listed = ", ".join(there_are) if there_are else "none; a simulated bench registers its own"
         raise serial.SerialException(f"there is no simulated device at {url} (there are: {listed})")
+    refusal = world.endpoints[key].line.refusal
+    if refusal is not None:
+        raise serial.SerialException(f"could not open port {url}: {refusal}")
     return world.endpoints[key]
 
 

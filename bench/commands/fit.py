@@ -38,6 +38,7 @@ def main(args: argparse.Namespace) -> int:
         must_be_writable(path)
     recordings = read_data(args, *args.data)
     measurements = pads(recordings)
+    options = {name: getattr(args, name) for name in ("starts", "ramps") if getattr(args, name) is not None}
     with status("fitting", quiet=args.json == "-") as progress:
         result = identify.fit(
             measurements,
@@ -48,13 +49,15 @@ def main(args: argparse.Namespace) -> int:
             degree=args.degree,
             progress=progress,
             sample_time=args.sample_time,
-            **{name: getattr(args, name) for name in ("starts", "ramps") if getattr(args, name) is not None},
+            **options,
         )
     text = json.dumps(result.to_json(), indent=2, allow_nan=False)
     if args.json == "-":
         print(text)
     else:
-        print("\n".join([*(f"{m.name}: {note}" for m in measurements for note in m.notes), *fit_lines(result)]))
+        said = " ".join(result.notes)  # most methods repeat what was heard on reading
+        heard = [f"{m.name}: {note}" for m in measurements for note in m.notes if note not in said]
+        print("\n".join([*heard, *fit_lines(result)]))
         if args.json:
             Path(args.json).write_text(text + "\n", "utf-8")
     if args.write:
@@ -62,8 +65,10 @@ def main(args: argparse.Namespace) -> int:
 
         write_model(args.write, result.model)
     if args.report:
-        from bench.fitview import fit_view
+        from bench.fitview import fit_view, over_times
         from bench.report import write_report
 
-        write_report(args.report, recordings[0], fit_view(result), host=recordings[0].host)
+        with status("fitting at other sample times", quiet=args.json == "-"):
+            over = over_times(result, measurements, **options)
+        write_report(args.report, recordings[0], fit_view(result, over), host=recordings[0].host)
     return EXIT_DONE

@@ -89,7 +89,7 @@ def shortened(m: Measurement, depth_mm: float, force_N: float) -> Run:
             (np.bincount(owner, share * s.time_s) / count, np.bincount(owner, share * u) / count, mean, weight)
         )
     time, u, y, weight = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Run(time, np.diff(time, prepend=time[0]), u, y, weight)
+    return Run(time, np.diff(time, prepend=time[0]), u, y, weight, stamp_std_s=m.stamp_std_s)
 
 
 def _owners(u: Array, length: int) -> NDArray[np.intp]:

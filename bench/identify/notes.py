@@ -7,6 +7,7 @@ import numpy as np
 from bench.recording.types import Measurement
 
 from ._kernel import Array
+from .clocks import clocks_note
 from .estimate import NOTHING, Estimate
 from .motion import glanced, holds
 from .noise import Noise
@@ -15,13 +16,17 @@ from .problem import Problem
 from .surface import moved_mm
 
 
-def about_data(problem: Problem, noise: Noise, unilateral: bool) -> list[str]:
-    """What is wrong or missing in the data themselves. `unilateral`: a pad that lets go shows no force in air."""
+def about_data(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = True) -> list[str]:
+    """What is wrong or missing in the data themselves, and which numbers that costs.
+
+    `unilateral`: a pad that lets go shows no force in air. `pasts`: the method fits the state of a run that begins
+    loaded; the others take it as at rest.
+    """
     out = list(problem.notes)
     several = len(problem.measurements) > 1
     measurements = [glanced(m) for m in problem.measurements]
     for m in measurements:
-        found = [*m.notes, *_about(m, noise, unilateral)]
+        found = [*m.notes, *_about(m, noise, unilateral, pasts)]
         out += [f"{m.name}: {line}" for line in found] if several else found
     speeds = np.concatenate([_move_speeds(m, problem.depth_mm) for m in measurements])
     if len(speeds) and speeds.max() < 1.5 * speeds.min():
@@ -31,11 +36,14 @@ def about_data(problem: Problem, noise: Noise, unilateral: bool) -> list[str]:
     if not noise.from_holds:
         out.append("There is no hold: the noise was judged from the motion, slow modes by the model alone.")
     if problem.depth_mm < 10 * noise.position_mm:
-        out.append("The depth is less than ten times the noise of the position: the elastic law cannot be told.")
+        out.append(
+            "The depth is less than ten times the noise of the position: the elastic law cannot be told, and its"
+            " numbers are none of the pad's."
+        )
     return out
 
 
-def _about(m: Measurement, noise: Noise, unilateral: bool) -> list[str]:
+def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> list[str]:
     out = []
     force, depth = m.force_N, np.interp(m.force_time_s, m.position_time_s, m.position_mm)
     top = float(np.abs(force).max())
@@ -45,14 +53,23 @@ def _about(m: Measurement, noise: Noise, unilateral: bool) -> list[str]:
             "The force is negative at depth: its sign is reversed (load cell `sign: -1`), or this is no pad pressed in."
         )
     elif top < 10 * noise.force_N:
-        out.append(f"The force ({top:.3g} N at most) is less than ten times its noise.")
+        out.append(f"The force ({top:.3g} N at most) is less than ten times its noise: no number is told well.")
     level = _cap(force)
     if level is not None:
         out.append(
             f"The force stands at {level:.4g} N again and again, with nothing above: the channel is saturated there."
+            " This costs the law at depth and all shares and rates: the cut-off peaks look like a pad that gives way."
         )
-    out += _level_notes(m, depth, noise, top, unilateral)
-    if deepest.any() and float(depth.max()) > 0:
+    stuck = _stuck(force, depth, noise, level)
+    if stuck:
+        out.append(
+            f"The force stands still to its last digit for {stuck} samples where its noise should show: drop-outs that"
+            " repeat the last value. This costs the quick rates first."
+        )
+    out += [line for line in [clocks_note(m, noise)] if line]
+    loaded = begins_loaded(m, float(depth.max()), top, noise)
+    out += _level_notes(m, depth, noise, top, unilateral, loaded, pasts)
+    if not loaded and deepest.any() and float(depth.max()) > 0:
         rising = np.flatnonzero(np.abs(force - _first_level(force, depth)) > max(8 * noise.force_N, 0.01 * top))
         start = depth[rising[0]] / depth.max() if len(rising) else 0.0
         if start > 0.5:
@@ -70,14 +87,16 @@ def _first_level(force: Array, depth: Array) -> float:
     return float(np.mean(force[: max(count, 1)]))
 
 
-def _level_notes(m: Measurement, depth: Array, noise: Noise, top: float, unilateral: bool) -> list[str]:
+def _level_notes(
+    m: Measurement, depth: Array, noise: Noise, top: float, unilateral: bool, loaded: bool, pasts: bool
+) -> list[str]:
     start, begun = _first_level(m.force_N, depth), float(depth[0])
     large = max(6 * noise.force_N, 0.01 * top)
-    if begins_loaded(m, float(depth.max()), top, noise):
-        return [
-            f"The data begin at {begun:.3g} mm with {start:.3g} N on the pad: its past is not known, and the state it"
-            " had left was fitted with it."
-        ]
+    if loaded:
+        said = f"The data begin at {begun:.3g} mm with {start:.3g} N on the pad: its past is not known, and "
+        if pasts:
+            return [said + "the state it had left was fitted with it."]
+        return [said + "this method takes it as at rest: every number is off by that (`continuous` fits it)."]
     out = []
     air = depth < -0.002 * np.ptp(depth)
     if unilateral and int(air.sum()) >= 10:
@@ -94,6 +113,25 @@ def _level_notes(m: Measurement, depth: Array, noise: Noise, top: float, unilate
             " and position apart."
         )
     return out
+
+
+def _stuck(force: Array, depth: Array, noise: Noise, cap: float | None) -> int:
+    """Samples in long runs of one value, in the pad, where the cell's digits are finer than its noise; 0: none.
+
+    A run of zeros is left out: a pad that has let go, in data that were computed.
+    """
+    steps = np.abs(np.diff(force))
+    moved = steps[steps > 0]
+    if moved.size < 20 or float(np.quantile(moved, 0.01)) > 0.5 * noise.force_N:
+        return 0  # coarse digits repeat by themselves
+    edges = np.flatnonzero(steps != 0) + 1
+    bounds = np.concatenate([[0], edges, [len(force)]])
+    lengths, first = np.diff(bounds), bounds[:-1]
+    usual = float(np.quantile(lengths, 0.95))
+    long = (lengths >= max(8, 5 * usual)) & (depth[first] > 0.05 * depth.max()) & (force[first] != 0)
+    if cap is not None:
+        long &= force[first] != cap
+    return int(lengths[long].sum())
 
 
 def _cap(force: Array) -> float | None:

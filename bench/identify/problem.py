@@ -169,5 +169,5 @@ def _run(m: Measurement, depth_mm: float, force_N: float, between: bool) -> tupl
     y, weight = np.zeros(len(time)), np.zeros(len(time))
     y[at] = m.force_N / force_N
     weight[at[_counted(m)]] = 1.0
-    run = Run(time, np.diff(time, prepend=time[0]), position / depth_mm, y, weight)
+    run = Run(time, np.diff(time, prepend=time[0]), position / depth_mm, y, weight, stamp_std_s=m.stamp_std_s)
     return run, at, len(motion_s) - len(m.position_time_s)

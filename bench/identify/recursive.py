@@ -29,6 +29,7 @@ from .objective import Structure
 from .parameters import model_dict, parameters
 from .problem import Problem, build
 from .result import Evidence, FitResult, Trace
+from .select import CLEAR
 from .starts import bounds_of
 from .uncertainty import independent_samples, spread_of
 
@@ -152,7 +153,8 @@ def fit(
                 progress(f"{family.name}, order {r}")
             ended.append(_over(problem, family, r, unilateral))
     judged = sorted(((_criterion(problem, e, ended), e, h) for e, h in ended), key=lambda item: item[0])
-    least, best, history = judged[0]
+    best = _pick([(criterion, e) for criterion, e, _ in judged])
+    least, history = next((criterion, h) for criterion, e, h in judged if e is best)
     spread = spread_of(problem, best)
     found, covariance, undetermined = parameters(problem, best, spread)
     unit = problem.force_N**2
@@ -189,13 +191,13 @@ def fit(
                 e.cost / problem.weight * unit,
                 criterion - least,
                 math.nan,
-                e.physical and e.converged,
+                _eligible(e),
                 e is best,
             )
             for criterion, e, _ in judged
         ],  # fmt: skip
         notes=[
-            *notes.about_data(problem, noise, unilateral),
+            *notes.about_data(problem, noise, unilateral, pasts=False),
             "As it would have stood when the run ended; `--method continuous` goes on to the end of the search.",
             *([] if best.converged else ["The numbers were still moving when the data ended."]),
         ],
@@ -241,6 +243,25 @@ def _settled(history: dict[str, list[float]]) -> bool:
             if np.ptp(late) > SETTLED * max(abs(late[-1]), 1e-12):
                 return False
     return True
+
+
+def _eligible(e: Estimate) -> bool:
+    """Physical, at rest, and every mode distinct and within what the data see, as for `continuous`."""
+    return e.physical and e.converged and e.distinct
+
+
+def _pick(judged: list[tuple[float, Estimate]]) -> Estimate:
+    """The least criterion of those that may be chosen (of all, where none may), or a simpler one within `CLEAR`.
+
+    The recursion stops when the run does, a little above its minimum, and not as far for every order: so a mode more
+    must be a clear gain, and a mode that doubles another, or has no share, is none.
+    """
+    able = [(criterion, e) for criterion, e in judged if _eligible(e)] or judged
+    least, best = min(able, key=lambda item: item[0])
+    for criterion, e in able:
+        if e.structure.size < best.structure.size and criterion < least + CLEAR:
+            best = e
+    return best
 
 
 def _criterion(problem: Problem, estimate: Estimate, ended: list[tuple[Estimate, dict[str, list[float]]]]) -> float:

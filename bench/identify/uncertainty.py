@@ -1,4 +1,4 @@
-"""Standard errors that hold under coloured residuals, uneven noise, and a doubtful surface."""
+"""Standard errors that hold under coloured residuals, uneven noise, a doubtful surface and doubtful stamps."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
       holds where the noise grows with depth or the model does not fit, but is uncertain itself. Where it says more
       than the first by more than its own doubt, it counts.
     Both are widened by Student's factor for the few samples that the residual may be worth. The prior of a doubtful
-    surface adds its own spread. Variables at a bound have none.
+    surface adds its own spread, and so do stamps of the position that may all be off together. Variables at a bound
+    have none.
     """
     P = estimate.structure.size
     scores, sensitivity, errors = _per_sample(problem, estimate)
@@ -54,7 +55,11 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
         ratio = np.where(even > 0, uneven / even, 1.0)
     ratio = np.where(ratio > 1 + TELLING * doubt, ratio, 1.0)
     widened = np.sqrt(ratio) * student(freedom)
-    return Spread(by_colour * np.outer(widened, widened), independent)
+    covariance = by_colour * np.outer(widened, widened)
+    for late in _late(problem, estimate):
+        moved = inverse @ late
+        covariance += np.outer(moved, moved)
+    return Spread(covariance, independent)
 
 
 def student(freedom: float) -> float:
@@ -123,6 +128,22 @@ def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list
         errors.append(np.concatenate(e_parts))
         scores.append(sensitivities[-1] * errors[-1][:, None])
     return scores, sensitivities, errors
+
+
+def _late(problem: Problem, estimate: Estimate) -> list[Array]:
+    """Of each run whose stamps are in doubt: Σ w J δF, (P,), δF what positions late by one of its deviations make.
+
+    A model driven by motion that is late by τ is itself late: δF = −τ dF/dt, with the slope over the two steps beside.
+    """
+    out = []
+    for run in problem.runs:
+        if run.stamp_std_s <= 0 or run.size < 3:
+            continue
+        pieces = list(objective.simulate(run, estimate.structure, estimate.x, derivatives=True))
+        force = np.concatenate([piece.force for piece in pieces])
+        weighted = run.weight * run.stamp_std_s * np.gradient(force, run.time_s)
+        out.append(np.asarray(np.sum([p.jacobian.T @ weighted[p.at] for p in pieces], axis=0), dtype=np.float64))
+    return out
 
 
 def _windowed(scores: list[Array], width: int) -> Array:

@@ -88,7 +88,7 @@ def _fig_1(settings: Settings) -> Picture:
             _fig_1_panel(ax, settings, pad)
 
     caption = (f"Force of ramps at constant speed, and the elastic response they tend to. How fast is fast enough, for "
-               f"a force at {depth:g} mm within so much of F^e: {'; '.join(lines)}.")  # fmt: skip
+               f"a force at {depth:g} mm within so much of Fᵉ: {'; '.join(lines)}.")  # fmt: skip
     svg = render("fig1", "Force against depth at several speeds", parts.WIDE, 340.0, draw)
     return Picture("fig1", "Fig. 1: force against depth", caption, svg)
 
@@ -100,7 +100,7 @@ def _fig_1_panel(ax: Axes, settings: Settings, pad: PadName) -> None:
         colour = light(f"time-{round(i * (len(TIME_RAMP) - 1) / max(len(speeds) - 1, 1))}")
         ax.plot(*ramp_force(model, depth_mm, speed), color=colour, label=f"{speed:g} mm/s")
     depth = np.linspace(0.0, depth_mm, POINTS)
-    ax.plot(depth, model.pad.law.force(depth), "--", color=light("ink"), label="F^e")
+    ax.plot(depth, model.pad.law.force(depth), "--", color=light("ink"), label="Fᵉ")
     ax.set_title(pad, loc="left")
     ax.set_xlabel("depth / mm")
     ax.set_ylabel("force / N")

@@ -184,9 +184,9 @@ def _wander(settings: Settings, draws: Sequence[Draw]) -> Finding:
             more.append(all_of_them)
         else:
             more += [one, all_of_them]
-        numbers.append(f"{law} law, median spread of F^e over r: {_percent(spreads)} from one start, {_percent(tops)} "
+        numbers.append(f"{law} law, median spread of Fᵉ over r: {_percent(spreads)} from one start, {_percent(tops)} "
                        "with the best of all.")  # fmt: skip
-    return Finding("noniterative_gamma", "noniterative, Table I", f"γ changes with r: F^e differs by more than the "
+    return Finding("noniterative_gamma", "noniterative, Table I", f"γ changes with r: Fᵉ differs by more than the "
                    f"{100 * limit:.0f} % of Table II.", tuple(main), tuple(more), tuple(numbers))  # fmt: skip
 
 
@@ -212,11 +212,11 @@ def _agree(settings: Settings, draws: Sequence[Draw]) -> Finding:
     tops = [best(fits) for fits in of(draws, "polyurethane", "iterative", "exponential")]
     spreads = [spread(list(top.values()), depths) if len(top) == len(ORDERS) else float("inf") for top in tops]
     truth = settings.polyurethane.law.force(np.array(depths))
-    numbers = [f"Median spread of F^e over r: {_percent(spreads)} (Table II: {100 * limit:.0f} %)."]
+    numbers = [f"Median spread of Fᵉ over r: {_percent(spreads)} (Table II: {100 * limit:.0f} %)."]
     for depth, force, i in zip(depths, truth, range(len(depths)), strict=True):
         off = [float(f.elastic.force(np.array(depths))[i] / force - 1) for top in tops for f in top.values()]
-        numbers.append(f"F^e at {depth:g} mm against the truth, median: {_percent(off, sign=True)}.")
-    same = _each("F^e of the four r is within the spread of Table II", [s <= limit for s in spreads])
+        numbers.append(f"Fᵉ at {depth:g} mm against the truth, median: {_percent(off, sign=True)}.")
+    same = _each("Fᵉ of the four r is within the spread of Table II", [s <= limit for s in spreads])
     return Finding("iterative_gamma", "iterative, Table II", "γ are very similar for every r.",
                    ((same, settings.criteria.always),), (), tuple(numbers))  # fmt: skip
 
@@ -253,7 +253,7 @@ def _one_iteration(settings: Settings, draws: Sequence[Draw]) -> Finding:
         truth = settings.polyurethane.law.force(np.array(c.depths_mm))[-1]
         off = [float(f.elastic.force(np.array(c.depths_mm))[-1] / truth - 1) for top in tops for f in top.values()]
         low, high = np.percentile(off, [5, 95]) if off else (np.nan, np.nan)
-        numbers.append(f"{words}: V is {_median(ratios):.2f} times that of the iterative method (median); F^e at "
+        numbers.append(f"{words}: V is {_median(ratios):.2f} times that of the iterative method (median); Fᵉ at "
                        f"{c.depths_mm[-1]:g} mm is off by {_percent(off, sign=True)} (median), from {100 * low:+.0f} "
                        f"to {100 * high:+.0f} % in nine cases of ten.")  # fmt: skip
     quiet = without_noise(settings)
@@ -261,8 +261,8 @@ def _one_iteration(settings: Settings, draws: Sequence[Draw]) -> Finding:
                    f"{_quiet(quiet, 'fast')} with γ from the first ramp; {_quiet(quiet, ALL_RAMPS)} with γ from every "
                    "rising ramp.")  # fmt: skip
     first_mm = settings.trajectory.levels_mm[0]
-    numbers.append(f"The first ramp ends at {first_mm:g} mm; what its few samples say of F^e deeper is drawn on from "
-                   "there. Later ramps begin on a pad that has relaxed, and are no F^e.")  # fmt: skip
+    numbers.append(f"The first ramp ends at {first_mm:g} mm; what its few samples say of Fᵉ deeper is drawn on from "
+                   "there. Later ramps begin on a pad that has relaxed, and are no Fᵉ.")  # fmt: skip
     return Finding("fast_one_iteration", "fast, Fig. 9, Table III", "One iteration is enough.",
                    tuple((r, c.always) for r in rates[:2]), tuple(rates[2:]), tuple(numbers))  # fmt: skip
 

@@ -48,7 +48,7 @@ def page(
 
 def _introduction(settings: Settings, draws: int, starts: int) -> str:
     pads = ", ".join(
-        f"{name} ({len(pad.relaxation.rates)} modes, c_0 = {1 - sum(pad.relaxation.shares):.2f})"
+        f"{name} ({len(pad.relaxation.rates)} modes, c₀ = {1 - sum(pad.relaxation.shares):.2f})"
         for name, pad in (("polyurethane", settings.polyurethane), ("silicone", settings.silicone))
     )
     words = (

@@ -12,11 +12,13 @@ from bench.recording.csv_write import write_csv
 from bench.recording.reader import read_recording
 from bench.recording.recover import RecoverReport, recover
 from bench.recording.types import Event, ForceChannel, Measurement, MotorChannel, Recording, StepMark
+from bench.recording.unfinished import Left, left_behind
 from bench.recording.writer import Recorder
 
 __all__ = [
     "Event",
     "ForceChannel",
+    "Left",
     "Measurement",
     "MotorChannel",
     "Recorder",
@@ -24,6 +26,7 @@ __all__ = [
     "Recording",
     "StepMark",
     "convert",
+    "left_behind",
     "parse_columns",
     "parse_units",
     "read_recording",

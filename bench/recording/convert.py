@@ -115,7 +115,7 @@ def recording_to_mcap(recording: Recording, target: Path) -> list[str]:
         file.metadata(RESULT, strings(result))
         file.finish()
     except OSError as error:
-        raise InputError(str(target), f"cannot be written ({error.strerror})") from None
+        raise InputError(str(target), f"cannot be written ({error.strerror})", "name another place for it") from None
     return ["stamps are whole nanoseconds now"]
 
 

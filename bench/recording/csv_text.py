@@ -11,6 +11,9 @@ from pathlib import Path
 
 from bench.errors import InputError
 
+MAX_SIZE = 256 << 20
+"""Bytes of a CSV file; as cells they take some ten times as much memory. Three channels at 1 kHz for two hours."""
+
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
 
 
@@ -64,7 +67,8 @@ def read_table(path: Path) -> Table:
                 lines.append(reader.line_num)
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", f"is not CSV: {error}", _WANTED) from None
-    assert header is not None
+    if header is None:
+        raise InputError(str(path), "is empty", _WANTED)
     decimal_comma = separator != "," and _uses_decimal_comma(rows)
     if separator != ",":
         notes.append(f"{_SEPARATORS[separator]} taken as separator")
@@ -83,9 +87,13 @@ _WANTED = "wanted: a header line time_s,position_mm,force_N and one line a sampl
 
 def _decode(path: Path, notes: list[str]) -> str:
     try:
-        data = path.read_bytes()
+        with path.open("rb") as stream:
+            data = stream.read(MAX_SIZE + 1)
     except OSError as error:
         raise InputError(str(path), f"cannot be read ({error.strerror})") from None
+    if len(data) > MAX_SIZE:
+        cure = "give it in parts, or fewer samples: nothing here needs a gigabyte"
+        raise InputError(str(path), f"is larger than {MAX_SIZE >> 20} MB", cure)
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         notes.append("read as UTF-16")
         encoding = "utf-16"

@@ -44,7 +44,7 @@ def write_csv(
     try:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="")
     except OSError as error:
-        raise InputError(str(path), f"cannot be written ({error.strerror})") from None
+        raise InputError(str(path), f"cannot be written ({error.strerror})", "name another place for it") from None
 
 
 def _cells(stamps: Array, times: Array, values: Sequence[float] | Sequence[str] | Array) -> list[str]:

@@ -6,6 +6,7 @@ the file against what the library's writer makes of the same calls, byte for byt
 
 from __future__ import annotations
 
+import contextlib
 import os
 import zlib
 from collections import Counter
@@ -23,7 +24,7 @@ from bench.recording.mcap_chunk import ChunkBuffer
 from bench.recording.schemas import LIBRARY, Topic
 
 CHUNK_SIZE = 128 * 1024
-"""Bytes before compression; what a torn or damaged chunk costs at most. A quarter of a second of a run is less."""
+"""Bytes before compression; what a torn or damaged chunk costs at most. A run flushes long before that."""
 
 _FOOTER_SIZE = 8 + 8 + 4
 
@@ -33,11 +34,14 @@ class McapFile:
 
     Messages stay in memory until a chunk is full; `flush` ends the chunk and hands it to the operating system (safe
     from a killed process), `sync` brings it onto the disk (safe from a power cut). Chunks are zstd with CRC. Raises
-    OSError when the disk does not take the bytes.
+    OSError when the disk does not take the bytes: the file then ends with its last whole record, and what it did not
+    take is kept, for the next call to try again.
     """
 
     def __init__(self, path: Path, topics: Iterable[Topic], epoch_ns: int) -> None:
-        self._stream = path.open("wb")
+        self._stream = path.open("wb", buffering=0)
+        self._size = 0  # bytes that the operating system has
+        self._out = bytearray()  # whole records on their way to it
         self._chunk = ChunkBuffer()
         self._schemas: list[records.Schema] = []
         self._channels: list[records.Channel] = []
@@ -46,11 +50,15 @@ class McapFile:
         self._metadata: list[records.MetadataIndex] = []
         self._counts: Counter[int] = Counter()
         self._span_ns: tuple[int, int] | None = None
-        self._stream.write(MCAP0_MAGIC)
-        self._stream.write(_bytes(records.Header(profile="", library=LIBRARY)))
+        self._out += MCAP0_MAGIC
+        self._out += _bytes(records.Header(profile="", library=LIBRARY))
         for topic in topics:
             self._define(topic, epoch_ns)
-        self._stream.flush()
+        try:
+            self._hand_over()
+        except OSError:
+            self._stream.close()
+            raise
 
     def _define(self, topic: Topic, epoch_ns: int) -> None:
         """Schema and channel of a topic, into the first chunk."""
@@ -67,14 +75,14 @@ class McapFile:
     def add_message(self, channel_id: int, log_ns: int, data: bytes, publish_ns: int, sequence: int) -> None:
         """One message into the chunk; a full chunk is written."""
         if self._chunk.add_message(channel_id, log_ns, data, publish_ns, sequence) > CHUNK_SIZE:
-            self._end_chunk()
+            self.flush()
 
     def metadata(self, name: str, fields: Mapping[str, str]) -> None:
         """A metadata record, after the messages written so far."""
         self._end_chunk()
         offset, size = self._write(records.Metadata(name=name, metadata=dict(fields)))
         self._metadata.append(records.MetadataIndex(offset=offset, length=size, name=name))
-        self._stream.flush()
+        self._hand_over()
 
     def attachment(self, name: str, media_type: str, data: bytes, log_ns: int) -> None:
         """An attachment, after the messages written so far."""
@@ -92,44 +100,62 @@ class McapFile:
                 media_type=media_type,
             )
         )
-        self._stream.flush()
+        self._hand_over()
 
     def flush(self) -> None:
         """End the chunk and hand everything to the operating system."""
         self._end_chunk()
-        self._stream.flush()
+        self._hand_over()
 
     def sync(self) -> None:
-        """`flush`, and wait until it is on the disk (some milliseconds)."""
-        self.flush()
+        """Wait until what was flushed is on the disk: some milliseconds, or many. May run beside the other calls."""
         os.fsync(self._stream.fileno())
 
+    @property
+    def waiting(self) -> int:
+        """Bytes of records that the operating system did not take yet."""
+        return len(self._out)
+
     def finish(self) -> None:
-        """Write index and footer, sync, close. Nothing may be written afterwards."""
+        """Write index and footer, sync, close. Nothing may be written afterwards; after an OSError only `abandon`."""
         self._end_chunk()
+        self._hand_over()  # the samples first: they count without an index too
         self._write(records.DataEnd(data_section_crc=0))
         self._write_summary()
-        self._stream.write(MCAP0_MAGIC)
-        self._stream.flush()
-        os.fsync(self._stream.fileno())
+        self._out += MCAP0_MAGIC
+        self._hand_over()
+        self.sync()
         self._stream.close()
 
     def abandon(self) -> None:
         """Close without index, after the disk refused bytes; what is on it stays readable."""
-        try:
-            self._stream.close()  # tries once more to write what it holds
-        except OSError:
-            # the descriptor is closed all the same; the first failure has been reported
-            return
+        self._stream.close()
 
     # -- inside ------------------------------------------------------------------------------------------------
 
     def _write(self, record: records.McapRecord) -> tuple[int, int]:
         """Append a record; returns its offset and size."""
         data = _bytes(record)
-        offset = self._stream.tell()
-        self._stream.write(data)
+        offset = self._size + len(self._out)
+        self._out += data
         return offset, len(data)
+
+    def _hand_over(self) -> None:
+        """Give the operating system what waits; all of it, or nothing."""
+        out = self._out
+        if not out:
+            return
+        done = 0
+        try:
+            while done < len(out):
+                done += self._stream.write(memoryview(out)[done:]) or 0
+        except OSError:
+            with contextlib.suppress(OSError):  # half a record would be damage
+                self._stream.truncate(self._size)
+                self._stream.seek(self._size)
+            raise
+        self._size += done
+        self._out = bytearray()
 
     def _end_chunk(self) -> None:
         """Write the chunk in progress with its message index, if there are messages in it."""
@@ -150,7 +176,7 @@ class McapFile:
             )
         )
         index, offsets = chunk.index_records()
-        self._stream.write(index)
+        self._out += index
         self._chunk_indices.append(
             records.ChunkIndex(
                 message_start_time=first_ns,
@@ -191,7 +217,7 @@ class McapFile:
             (Opcode.ATTACHMENT_INDEX, self._attachments),
             (Opcode.METADATA_INDEX, self._metadata),
         )
-        start = self._stream.tell()
+        start = self._size + len(self._out)
         summary = bytearray()
         offsets = bytearray()
         for opcode, group in groups:
@@ -204,7 +230,7 @@ class McapFile:
         summary += offsets
         footer = records.Footer(summary_start=start, summary_offset_start=offset_start, summary_crc=0)
         footer.summary_crc = zlib.crc32(_bytes(footer)[: 9 + _FOOTER_SIZE - 4], zlib.crc32(summary))
-        self._stream.write(summary)
+        self._out += summary
         self._write(footer)
 
 

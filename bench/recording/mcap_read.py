@@ -32,6 +32,7 @@ from bench.recording.schemas import (
     STEP,
     TOPICS,
     TOUCH_OFF,
+    epoch_of,
 )
 from bench.recording.types import Array, Event, ForceChannel, MotorChannel, Recording, StepMark
 
@@ -128,9 +129,8 @@ class _Reading:
                 "padbench reads recordings of its own; export others as CSV",
             )
         self.by_id[channel.id] = column
-        epoch = channel.metadata.get("epoch_ns", "")
-        if self.epoch_ns is None and epoch.isdecimal():
-            self.epoch_ns = int(epoch)
+        if self.epoch_ns is None:
+            self.epoch_ns = epoch_of(channel.metadata)
 
     def _block(self, block: Block) -> None:
         by_id = self.by_id
@@ -171,10 +171,11 @@ class _Reading:
 
     def _recording(self, scan: Scan) -> Recording:
         run = self.metadata.get(RUN, {})
-        if run.get("epoch_ns", "").isdecimal():
-            self.epoch_ns = int(run["epoch_ns"])
+        epoch = epoch_of(run)
+        if epoch is not None:
+            self.epoch_ns = epoch
         if self.epoch_ns is None:
-            first = [int(c.parts["log_ns"][0][0]) for c in self.columns.values() if c.count]
+            first = [int(part[0]) for c in self.columns.values() for part in c.parts.get("log_ns", [])[:1] if part.size]
             self.epoch_ns = min(first, default=0)
         motor, cell = self.columns[MOTOR.name], self.columns[LOAD_CELL.name]
         overload = _array(cell, "overload")
@@ -273,7 +274,7 @@ def _digest(name: str, column: _Column) -> None:
     try:
         objects = json.loads(b"[" + b",".join(column.texts) + b"]")
         good = len(objects) == len(column.texts) and all(type(o) is dict for o in objects)
-    except ValueError:
+    except (ValueError, RecursionError):
         good = False
     if not good:
         objects = _one_by_one(column)
@@ -285,14 +286,20 @@ def _digest(name: str, column: _Column) -> None:
         column.objects += objects
     else:
         for key in fields:
-            values = [o.get(key, np.nan) for o in objects]
-            try:
-                numbers = np.array(values, dtype=float)
-            except (TypeError, ValueError):
-                numbers = np.array([_number(v) for v in values])
-            column.parts.setdefault(key, []).append(numbers)
+            column.parts.setdefault(key, []).append(_numbers([o.get(key) for o in objects]))
     column.count += len(objects)
     column.publish_ns, column.log_ns, column.texts = [], [], []
+
+
+def _numbers(values: list[Any]) -> Array:
+    """One number a message, NaN where there is none or it is not finite."""
+    kinds = set(map(type, values))
+    if kinds <= {float, bool, type(None)}:
+        numbers = np.array(values, dtype=float)
+    else:
+        numbers = np.array([_number(v) for v in values], dtype=float)
+    numbers[~np.isfinite(numbers)] = np.nan
+    return numbers
 
 
 def _one_by_one(column: _Column) -> list[dict[str, Any]]:
@@ -301,7 +308,7 @@ def _one_by_one(column: _Column) -> list[dict[str, Any]]:
     for i, text in enumerate(column.texts):
         try:
             found = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             found = None
         if isinstance(found, dict):
             objects.append(found)
@@ -318,7 +325,10 @@ def _array(column: _Column, key: str) -> Array:
 
 
 def _number(value: object) -> float:
-    return float(value) if isinstance(value, int | float) else float("nan")
+    try:
+        return float(value) if isinstance(value, int | float) else float("nan")
+    except OverflowError:  # a whole number of more than 308 digits
+        return float("nan")
 
 
 def _surface(recording: Recording) -> tuple[float | None, float]:

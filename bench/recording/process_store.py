@@ -21,7 +21,7 @@ from bench.errors import InputError
 from bench.recording import frames
 
 SEND_SIZE = 16_384
-SEND_AFTER_NS = 20_000_000
+SEND_AFTER_NS = 15_000_000
 """Messages wait at most so long in the run's own memory, which dies with it."""
 
 BUFFER_LIMIT = 32 << 20
@@ -127,6 +127,7 @@ class ProcessStore:
         if self._dead:
             self._buffer.clear()
             return
+        self._listen()
         try:
             taken = os.write(self._pipe, self._buffer)
         except BlockingIOError:
@@ -138,6 +139,10 @@ class ProcessStore:
                 self.problem = f"the process that writes {self._path} died: {self._last_words()}"
             return
         del self._buffer[:taken]
+
+    def _listen(self) -> None:
+        """Take what the writer has said by now, without waiting."""
+        self._reply("problem", 0.0)
 
     def _overflow(self) -> None:
         self.lost += 1
@@ -161,8 +166,8 @@ class ProcessStore:
                     self.problem = str(said["problem"])
                 if key in said:
                     return True
-            left = deadline - time.monotonic()
-            if left <= 0 or not select.select([out], [], [], left)[0]:
+            left = max(0.0, deadline - time.monotonic())
+            if not select.select([out], [], [], left)[0]:
                 return False
             data = os.read(out, 65536)
             if not data:

@@ -34,6 +34,12 @@ def read_recording(
 
 def recording_file(path: Path) -> Path:
     """The file itself, or the recording inside a run folder. Raises `InputError` where there is none."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError) as error:
+        raise InputError(str(path), f"cannot be read ({getattr(error, 'strerror', None) or error})") from None
     if path.is_dir():
         file = path / RECORDING_FILE
         if not file.is_file():

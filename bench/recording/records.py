@@ -14,10 +14,24 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any, cast
 
+import lz4.frame  # type: ignore[import-untyped]  # comes with mcap, without types
+import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, ChunkIndex, Header, Metadata, Schema
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+    SummaryOffset,
+)
 from mcap.writer import MCAP0_MAGIC
 
 MAGIC: bytes = MCAP0_MAGIC
@@ -27,14 +41,12 @@ RECORD = struct.Struct("<BQ")
 """Opcode and length of the content."""
 
 _MESSAGE = struct.Struct("<BQHIQQ")
-_CHUNK = struct.Struct("<QQQII")
+CHUNK_HEAD = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, uncompressed CRC, length of the compression's name."""
 
 _FOOTER_SIZE = 20
-_SIGNATURES = (b"\x04\x00\x00\x00zstd", b"\x03\x00\x00\x00lz4")
-"""How the compression stands in a chunk: the pattern that a search for chunks looks for."""
-
-_MAX_UNCOMPRESSED = 1 << 31
+_MAX_UNCOMPRESSED = 1 << 27
+"""A chunk that says it is larger is not unpacked: writers make chunks of some megabytes."""
 
 
 @dataclass(frozen=True)
@@ -63,13 +75,13 @@ def name_of(opcode: int) -> str:
         return f"a record of kind {opcode}"
 
 
-def parse(opcode: int, body: bytes) -> Found | None:
+def parse(opcode: int, body: bytes, *, strict: bool = False) -> Found | None:
     """A record's content, checked as far as the format allows; None for those that only repeat others.
 
-    Raises `Damaged`.
+    `strict`: the writer leaves no checksum out, so that a missing one is damage too. Raises `Damaged`.
     """
     if opcode == Opcode.CHUNK:
-        return _chunk(body)
+        return _chunk(body, strict)
     if opcode == Opcode.MESSAGE:
         return Block(RECORD.pack(opcode, len(body)) + body)
     if opcode == Opcode.MESSAGE_INDEX:
@@ -86,14 +98,32 @@ def parse(opcode: int, body: bytes) -> Found | None:
         raise Damaged(f"{name_of(opcode)} is damaged", whole=False) from error
     if stream.count != len(body):
         raise Damaged(f"{name_of(opcode)} has a damaged length", whole=False)
+    if opcode in _REPEATING:
+        return None
+    if not getattr(found, "name", getattr(found, "topic", "a header has none")):
+        raise Damaged(f"{name_of(opcode)} has no name", whole=False)
     if isinstance(found, Attachment):
         (crc,) = struct.unpack("<I", body[-4:])
-        if crc and zlib.crc32(body[:-4]) != crc:
+        if (crc or strict) and zlib.crc32(body[:-4]) != crc:
             raise Damaged(f"attachment {found.name!r} does not match its checksum", whole=True)
     return cast(Found, found)
 
 
+_COMPRESSIONS = (b"zstd", b"lz4", b"")
+
+_REPEATING: dict[int, Any] = {
+    Opcode.CHUNK_INDEX: ChunkIndex,
+    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
+    Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.STATISTICS: Statistics,
+    Opcode.SUMMARY_OFFSET: SummaryOffset,
+    Opcode.FOOTER: Footer,
+    Opcode.DATA_END: DataEnd,
+}
+"""What a finished file says of itself; met on the way only where the end of its data is damaged."""
+
 _KINDS: dict[int, Any] = {
+    **_REPEATING,
     Opcode.HEADER: Header,
     Opcode.SCHEMA: Schema,
     Opcode.CHANNEL: Channel,
@@ -102,43 +132,70 @@ _KINDS: dict[int, Any] = {
 }
 
 
-def _chunk(body: bytes) -> Block:
+def _chunk(body: bytes, strict: bool) -> Block:
     try:
-        _, _, plain_size, crc, name_size = _CHUNK.unpack_from(body)
-        name = body[_CHUNK.size : _CHUNK.size + name_size]
-        (data_size,) = struct.unpack_from("<Q", body, _CHUNK.size + name_size)
+        _, _, plain_size, crc, name_size = CHUNK_HEAD.unpack_from(body)
+        name = body[CHUNK_HEAD.size : CHUNK_HEAD.size + name_size]
+        (data_size,) = struct.unpack_from("<Q", body, CHUNK_HEAD.size + name_size)
     except struct.error:
         raise Damaged("a chunk has a damaged head", whole=False) from None
-    begin = _CHUNK.size + name_size + 8
+    begin = CHUNK_HEAD.size + name_size + 8
     if begin + data_size != len(body):
         raise Damaged("a chunk has a damaged head", whole=False)
-    plain = _inflate(name, body[begin:], plain_size, crc)
+    if name not in _COMPRESSIONS:
+        raise Damaged(f"a chunk is packed as {name[:20].decode(errors='replace')!r}, which is not known", whole=True)
+    if plain_size > _MAX_UNCOMPRESSED:
+        raise Damaged(f"a chunk says it unpacks to {plain_size} bytes: more than any writer makes", whole=True)
+    plain = inflate(name, body[begin:], plain_size, crc, strict=strict)
     if plain is None:
         raise Damaged("a chunk does not match its checksum", whole=True)
     return Block(plain)
 
 
-def _inflate(name: bytes, data: bytes, plain_size: int, crc: int) -> bytes | None:
-    """A chunk's records, or None where they are not what was written."""
-    if plain_size > _MAX_UNCOMPRESSED or name not in (b"zstd", b"lz4", b""):
+def inflate(name: bytes, data: bytes, plain_size: int, crc: int, *, strict: bool) -> bytes | None:
+    """A chunk's records, or None where they are not what was written. Never unpacks to more than a chunk may have."""
+    if plain_size > _MAX_UNCOMPRESSED:
         return None
-    chunk = Chunk(name.decode(), data, 0, 0, crc, plain_size)
     try:
-        stream, size = get_chunk_data_stream(chunk, validate_crc=True)
-        plain: bytes = stream.read(size)
-    except Exception:  # each compression has errors of its own, a wrong checksum is a ValueError
+        plain = _unpacked(name, data, plain_size)
+    except Exception:  # each compression has errors of its own
         return None
-    return plain if len(plain) == plain_size and (crc or _well_formed(plain)) else None
+    if len(plain) != plain_size or ((crc or strict) and zlib.crc32(plain) != crc):
+        return None
+    return plain if _well_formed(plain) else None
+
+
+def _unpacked(name: bytes, data: bytes, plain_size: int) -> bytes:
+    """At most so many bytes, and nothing behind them: a damaged size must not take the next record along."""
+    if name == b"zstd":
+        # A frame's own size is what the library makes room for.
+        if zstandard.frame_content_size(data) not in (plain_size, -1):
+            return b""
+        unpack = zstandard.ZstdDecompressor().decompress
+        return unpack(data, max_output_size=plain_size, allow_extra_data=False)
+    if name == b"lz4":
+        frame = lz4.frame.LZ4FrameDecompressor()
+        plain: bytes = frame.decompress(data, max_length=plain_size)
+        return plain if frame.eof and not frame.unused_data else b""
+    return bytes(data) if not name else b""
 
 
 def _well_formed(plain: bytes) -> bool:
-    """Whether records fill a chunk exactly; asked where the writer left no checksum."""
+    """Whether records fill a chunk exactly, and definitions are some: a checksum may be missing, or made to fit."""
     position = 0
     while position + RECORD.size <= len(plain):
         opcode, length = RECORD.unpack_from(plain, position)
         if opcode == Opcode.MESSAGE and length < _MESSAGE.size - RECORD.size:
             return False
-        position += RECORD.size + length
+        end = position + RECORD.size + length
+        if end > len(plain):
+            return False
+        if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            try:
+                parse(opcode, plain[position + RECORD.size : end])
+            except Damaged:
+                return False
+        position = end
     return position == len(plain)
 
 
@@ -200,7 +257,17 @@ def read_index(data: Buffer) -> Index | None:
     if crc == 0 or zlib.crc32(data[summary : foot + RECORD.size + 16]) != crc:
         return None
     index = Index(summary)
-    position = summary
+    try:
+        _fill(index, data, foot)
+    except Exception:  # as in `parse`: a summary that matches its checksum may still be nonsense
+        return None
+    index.order = sorted(index.known)
+    return index
+
+
+def _fill(index: Index, data: Buffer, foot: int) -> None:
+    """Read the summary's records up to the footer."""
+    position = index.summary
     while position < foot:
         opcode, length = RECORD.unpack_from(data, position)
         end = position + RECORD.size + length
@@ -218,38 +285,3 @@ def read_index(data: Buffer) -> Index | None:
             assert isinstance(found, Schema | Channel)
             index.definitions.append(found)
         position = end
-    index.order = sorted(index.known)
-    return index
-
-
-def find_chunk(data: Buffer, start: int) -> tuple[int, int, Block] | None:
-    """Begin, end and content of the next chunk from `start` on that matches its checksum; None where there is none.
-
-    A chunk is known by the name of its compression and the sizes around it, so that damage to its own opcode or
-    length does not hide it.
-    """
-    best: tuple[int, int, Block] | None = None
-    for signature in _SIGNATURES:
-        at = data.find(signature, start)
-        while at >= 0 and (best is None or at < best[0]):
-            begin = at - (_CHUNK.size - 4) - RECORD.size
-            if begin >= start:
-                found = _chunk_around(data, at, signature)
-                if found is not None:
-                    best = (begin, *found)
-                    break
-            at = data.find(signature, at + 1)
-    return best
-
-
-def _chunk_around(data: Buffer, at: int, signature: bytes) -> tuple[int, Block] | None:
-    size_at = at + len(signature)
-    if size_at + 8 > len(data):
-        return None
-    _, _, plain_size, crc, _ = _CHUNK.unpack_from(data, at - (_CHUNK.size - 4))
-    (data_size,) = struct.unpack_from("<Q", data, size_at)
-    begin, end = size_at + 8, size_at + 8 + data_size
-    if end > len(data):
-        return None
-    plain = _inflate(signature[4:], data[begin:end], plain_size, crc)
-    return None if plain is None else (end, Block(plain))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections import Counter
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from bench.recording.mcap_read import mapped
 from bench.recording.reader import recording_file
 from bench.recording.records import Block, Found, definitions, messages
 from bench.recording.scan import Damage, Scan
-from bench.recording.schemas import LIBRARY, RECOVERED, RESULT, TOPICS
+from bench.recording.schemas import LIBRARY, RECOVERED, RESULT, RUN, TOPICS, epoch_of
 
 
 @dataclass
@@ -37,9 +38,17 @@ class RecoverReport:
     has_result: bool = True
     """The run had come to its end (`padbench.result` is there)."""
 
+    last_s: float | None = None
+    """Bench time of the last message kept."""
+
     @property
     def lost(self) -> bool:
-        """Whether anything that had been written is not in the new file."""
+        """Whether anything that had been written is not in the new file, or the file ended before the run did."""
+        return bool(self.gone or not self.finished)
+
+    @property
+    def gone(self) -> bool:
+        """Whether something before the file's end is missing."""
         return bool(self.missing or self.nameless or any(damage.content for damage in self.damage))
 
     @property
@@ -59,7 +68,11 @@ class RecoverReport:
         if self.nameless:
             lines.append(f"lost: {self.nameless} messages of channels that nothing describes any more")
         if not self.finished:
-            lines.append("the file had not been finished: its process was killed, or it was copied while it ran")
+            since = f"{self.last_s:.3f} s" if self.last_s is not None else "what was kept"
+            lines.append(
+                f"lost: what came after {since}: the file had not been finished. Of a run that was killed that is a "
+                "tenth of a second at most; of a file that was cut off later, nobody knows how much"
+            )
         if not self.has_result:
             lines.append(f"no {RESULT} record: the run did not come to its end")
         if not self.lost:
@@ -75,17 +88,21 @@ def recover(path: str | Path, out: str | Path | None = None) -> tuple[Path, Reco
     """
     source = recording_file(Path(path))
     target = Path(out) if out is not None else source.with_name(f"{source.stem}.recovered.mcap")
-    if target.exists() and target.samefile(source):
-        raise InputError(str(target), "is the damaged file itself", "name another file: it is never overwritten")
-    draft = target.with_name(f".{target.name}.{os.getpid()}")
+    draft = target.with_name(f".recovering-{os.getpid()}")
     try:
+        if target.exists() and target.samefile(source):
+            raise InputError(str(target), "is the damaged file itself", "name another file: it is never overwritten")
+        if target.is_dir():
+            raise InputError(str(target), "is a folder", "name a file")
         with mapped(source) as data:
             report = _rewrite(Scan(data), source, draft)
         draft.replace(target)
     except OSError as error:
-        raise InputError(str(target), f"cannot be written ({error.strerror})") from None
+        cure = "name another place behind it: padbench recover MCAP OUT"
+        raise InputError(str(target), f"cannot be written ({error.strerror})", cure) from None
     finally:
-        draft.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # it was never made, or is the target now
+            draft.unlink()
     return target, report
 
 
@@ -102,8 +119,9 @@ def _rewrite(scan: Scan, source: Path, draft: Path) -> RecoverReport:
             copy.take(found)
         report = copy.account()
         if report.lost:
-            lost = [line.removeprefix("lost: ") for line in report.lines() if line.startswith("lost: ")]
-            copy.writer.add_metadata(RECOVERED, {"from": source.name, "lost": "; ".join(lost)})
+            lost = "; ".join(line.removeprefix("lost: ") for line in report.lines() if line.startswith("lost: "))
+            # What is missing inside is told by whoever reads the file; a run without its end says so itself.
+            copy.writer.add_metadata(RECOVERED, {"from": source.name, "lost" if report.gone else "unfinished": lost})
         copy.finish()
     finally:
         copy.stream.close()
@@ -129,6 +147,8 @@ class _Copy:
         self._schemas: dict[int, int] = {0: 0}
         self._old_schemas: dict[int, Schema] = {}
         self._channels: dict[int, int] = {}
+        self._last_ns = 0
+        self._epoch_ns: int | None = None
 
     def take(self, found: Found) -> None:
         """Copy what has come."""
@@ -142,6 +162,7 @@ class _Copy:
             self._end_chunk()
             self.writer.add_metadata(found.name, found.metadata)
             self._report.metadata += 1
+            self._epoch_ns = epoch_of(found.metadata) if found.name == RUN else self._epoch_ns
             self._records.add(found.name)
         elif isinstance(found, Attachment):
             self._end_chunk()
@@ -159,6 +180,8 @@ class _Copy:
         report.damage, report.finished = scan.damage, scan.finished
         report.per_topic = {self._topics[channel]: count for channel, count in self._kept.items()}
         report.messages = sum(self._kept.values())
+        if report.messages and self._epoch_ns is not None:
+            report.last_s = (self._last_ns - self._epoch_ns) / 1e9
         report.has_result = not self._ours or RESULT in self._records
         if self._ours and any(damage.content for damage in scan.damage):
             gone = {channel: last + 1 - self._kept[channel] for channel, last in self._last_sequence.items()}
@@ -175,6 +198,7 @@ class _Copy:
                     continue
             self.writer.add_message(channels[channel_id], log_ns, data, publish_ns, sequence)
             self._kept[channel_id] += 1
+            self._last_ns = max(self._last_ns, log_ns)
             self._last_sequence[channel_id] = sequence
 
     def _define(self, channel_id: int, block: Block) -> None:

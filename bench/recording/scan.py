@@ -2,8 +2,8 @@
 
 A whole file is walked from its first record to the end of its data, with every checksum looked at. Where a record is
 damaged, the walk goes on at the next place that is known to be good: the index tells it, if the file was finished,
-else the next chunk is searched by its own form and proven by its checksum. A file that ends early is read to its last
-whole record. What had to be passed over is kept in `damage`.
+else the next record is searched by its own form, and proven by its checksum or by its parts (`search`). A file that
+ends early is read to its last whole record. What had to be passed over is kept in `damage`.
 """
 
 from __future__ import annotations
@@ -23,15 +23,17 @@ from bench.recording.records import (
     Damaged,
     Found,
     Index,
-    find_chunk,
     name_of,
     parse,
     read_index,
 )
+from bench.recording.schemas import LIBRARY
+from bench.recording.search import Search
 
 _LAST_KNOWN_OPCODE = int(Opcode.DATA_END)
 _FIRST_PRIVATE_OPCODE = 0x80
 _DATA_END_SIZE = 4
+_CHECKSUMMED = (Opcode.CHUNK, Opcode.ATTACHMENT)
 
 
 @dataclass(frozen=True)
@@ -71,22 +73,31 @@ class Scan:
             header = parse(opcode, self.data[position + RECORD.size : end])
             if isinstance(header, Header):
                 self.header, position = header, end
+        search = Search(self.data, strict=self.ours)
         if index is not None:
             yield from index.definitions
         size = len(self.data)
         while position < size:
+            if size - position == len(MAGIC) and self.data[position:] == MAGIC:
+                self.finished = True
+                return
             try:
                 opcode, end = self._frame(position, index)
                 if opcode == Opcode.DATA_END and end - position == RECORD.size + _DATA_END_SIZE:
                     self.finished = True
                     return
-                found = parse(opcode, self.data[position + RECORD.size : end])
+                found = parse(opcode, self.data[position + RECORD.size : end], strict=self.ours)
+                if index is None and opcode not in _CHECKSUMMED:
+                    self._must_end(position, opcode, end, search)
             except Damaged as damaged:
                 if damaged.whole:
+                    if index is None:  # bytes may be missing in it, and its length reach too far
+                        behind = search.after(position)
+                        end = min(end, behind.begin) if behind is not None and behind.begin > position else end
                     self.damage.append(Damage(position, end - position, str(damaged)))
                     position = end
                     continue
-                position, found = self._resume(position, index, str(damaged))
+                position, found = self._resume(position, index, search, str(damaged))
                 if index is not None and position >= index.summary:
                     self.finished = True
                     return
@@ -96,6 +107,11 @@ class Scan:
             if found is not None:
                 yield found
             position = end
+
+    @property
+    def ours(self) -> bool:
+        """Written by padbench, or by nobody knows whom."""
+        return self.header is None or self.header.library.startswith(LIBRARY)
 
     def _frame(self, position: int, index: Index | None) -> tuple[int, int]:
         """Kind and end of the record at `position`; the index knows better than the record's own head."""
@@ -110,19 +126,38 @@ class Scan:
             raise Damaged("no record begins here", whole=False)
         if end > len(self.data):
             raise Damaged(f"{name_of(opcode)} is cut off", whole=False)
+        if self.ours and (opcode == Opcode.MESSAGE or opcode >= _FIRST_PRIVATE_OPCODE):
+            raise Damaged("no record of this writer begins here", whole=False)  # its messages are all in chunks
         if index is not None and index.next_after(position) < end:
             raise Damaged(f"{name_of(opcode)} has a damaged length", whole=False)
         return opcode, end
 
-    def _resume(self, position: int, index: Index | None, what: str) -> tuple[int, Block | None]:
+    def _must_end(self, position: int, opcode: int, end: int, search: Search) -> None:
+        """Bytes that were lost inside a record without a checksum make it swallow the head of the next one.
+
+        Where nothing begins behind a record, and a whole one inside it, it is `Damaged`.
+        """
+        if end == len(self.data) or self.data[end : end + len(MAGIC)] == MAGIC:
+            return
+        with contextlib.suppress(Damaged):
+            self._frame(end, None)
+            return
+        found = search.after(position)
+        if found is not None and found.begin < end:
+            raise Damaged(f"{name_of(opcode)} has lost bytes", whole=False)
+
+    def _resume(self, position: int, index: Index | None, search: Search, what: str) -> tuple[int, Block | None]:
         """Where the walk goes on after trouble at `position`, and the chunk found on the way; notes what is lost."""
         if index is not None:
             resume = index.next_after(position)
             content = position in index.known or not index.has_chunks
             self.damage.append(Damage(position, resume - position, what, content))
             return resume, None
-        found = find_chunk(self.data, position)
-        begin, end, block = found if found is not None else (len(self.data), len(self.data), None)
-        if begin > position:
-            self.damage.append(Damage(position, begin - position, what))
-        return end, block
+        found = search.after(position)
+        if found is None:
+            content = self.data[position] != Opcode.MESSAGE_INDEX  # which repeats what the chunk before it holds
+            self.damage.append(Damage(position, len(self.data) - position, what, content))
+            return len(self.data), None
+        if found.begin > position:
+            self.damage.append(Damage(position, found.begin - position, what))
+        return found.position, found.block

@@ -8,6 +8,7 @@ name. A value that was not measured is left out (JSON has no NaN, and both viewe
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -178,3 +179,14 @@ RUN_TOPICS = TOPICS[:5]
 """What a run writes; `/extra` comes only with converted CSV files."""
 
 LOG_LEVELS = {"debug": 1, "info": 2, "warning": 3, "error": 4, "fatal": 5}
+
+_LATEST_NS = 1 << 62
+
+
+def epoch_of(fields: Mapping[str, str]) -> int | None:
+    """`epoch_ns` of a record or of a channel's metadata; None where it is not there, or is no time."""
+    text = fields.get("epoch_ns", "")
+    if not (text.isascii() and text.isdecimal() and len(text) <= 19):
+        return None
+    ns = int(text)
+    return ns if ns < _LATEST_NS else None

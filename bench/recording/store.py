@@ -7,8 +7,12 @@ from typing import Protocol
 
 from bench.recording.mcap_file import McapFile
 from bench.recording.schemas import RUN_TOPICS, Topic
+from bench.recording.space import running_out
 
 NEVER_NS = 1 << 62
+
+WAITING_LIMIT = 32 << 20
+"""Bytes kept in memory while the disk takes none: the end of a run, in case that room is made."""
 
 
 class Store(Protocol):
@@ -52,7 +56,7 @@ class InlineStore:
     """Writes in the caller's process, for the virtual clock: same calls, same bytes.
 
     The flush timer runs on the bench's clock, from the first message that waits. The disk is synced at the end only:
-    what a power cut takes from a simulated run, the same seed brings back.
+    what a power cut takes from a simulated run, the same seed brings back. Raises OSError where no file can begin.
     """
 
     def __init__(self, path: Path, epoch_ns: int, flush_ns: int, topics: tuple[Topic, ...] = RUN_TOPICS) -> None:
@@ -72,43 +76,41 @@ class InlineStore:
 
     def message(self, channel_id: int, log_ns: int, data: bytes, publish_ns: int, sequence: int) -> None:
         """One message; see `Store`."""
-        if self.problem is not None:
+        if self.problem is not None and self._file.waiting > WAITING_LIMIT:
             self.lost += 1
             return
         try:
             self._add(channel_id, log_ns, data, publish_ns, sequence)
-            if log_ns >= self._due_ns:
-                self._due_ns = NEVER_NS
-                self._file.flush()
-            elif self._due_ns == NEVER_NS:
-                self._due_ns = log_ns + self._flush_ns
         except OSError as error:
             self._fail(error)
+        if log_ns >= self._due_ns:
+            self.boundary()
+        elif self._due_ns == NEVER_NS:
+            self._due_ns = log_ns + self._flush_ns
 
     def metadata(self, name: str, fields: dict[str, str]) -> None:
         """One metadata record; see `Store`."""
-        if self.problem is None:
-            try:
-                self._file.metadata(name, fields)
-            except OSError as error:
-                self._fail(error)
+        try:
+            self._file.metadata(name, fields)
+        except OSError as error:
+            self._fail(error)
 
     def attachment(self, name: str, media_type: str, data: bytes, log_ns: int) -> None:
         """One attachment; see `Store`."""
-        if self.problem is None:
-            try:
-                self._file.attachment(name, media_type, data, log_ns)
-            except OSError as error:
-                self._fail(error)
+        try:
+            self._file.attachment(name, media_type, data, log_ns)
+        except OSError as error:
+            self._fail(error)
 
     def boundary(self) -> None:
         """Flush; see `Store`."""
+        self._due_ns = NEVER_NS
+        try:
+            self._file.flush()
+        except OSError as error:
+            self._fail(error)
         if self.problem is None:
-            self._due_ns = NEVER_NS
-            try:
-                self._file.flush()
-            except OSError as error:
-                self._fail(error)
+            self.problem = running_out(self._path.parent)
 
     def tick(self, now_ns: int) -> None:
         """Flush when the oldest message has waited long enough; see `Store`."""
@@ -120,9 +122,6 @@ class InlineStore:
         if self._closed:
             return
         self._closed = True
-        if self.problem is not None:
-            self._file.abandon()
-            return
         try:
             self._file.finish()
         except OSError as error:
@@ -130,4 +129,6 @@ class InlineStore:
             self._file.abandon()
 
     def _fail(self, error: OSError) -> None:
-        self.problem = f"cannot write {self._path}: {error.strerror or error}"
+        """Keep the first problem; what the disk did not take is tried again with the next flush."""
+        if self.problem is None:
+            self.problem = f"cannot write {self._path}: {error.strerror or error}"

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self
 
+from bench.errors import InputError
 from bench.recording.encode import (
     event_json,
     flags_fragment,
@@ -38,13 +39,15 @@ from bench.recording.schemas import (
     STEP,
     TOUCH_OFF,
 )
+from bench.recording.space import must_fit, need_bytes
 from bench.recording.store import InlineStore, Store
 from bench.recording.truth_block import without_truth
 from bench.recording.types import StepMark
 from drivers.wire import Clock
 
-FLUSH_S = 0.25
-"""Longest time a message waits in the memory of the process that writes the file."""
+FLUSH_S = 0.04
+"""Longest time a message waits in the memory of the process that writes the file. A killed run may lose a tenth of a
+second: the rest of it is for the way through the pipe, and for a processor that is busy with something else."""
 
 HOST_SIZE = 4096
 """The host record is padded to a multiple of so many bytes: it differs between two runs of one seed, and must not
@@ -66,10 +69,21 @@ class Recorder:
     `mode` "inline" writes in this process (virtual clock: the same calls give the same bytes), "process" hands
     everything to a process behind a pipe and never blocks (wall clock; where there are no POSIX pipes it is inline).
     Calls never raise because of the disk: ask `problem()`, and look at what `finish` returns. All times are seconds
-    on the bench's clock. Raises `InputError` where the file exists or cannot be made.
+    on the bench's clock. `planned_s` and `samples_per_s` (both devices together) say how much room the run will need.
+    Raises `InputError` where the file exists or cannot be made, or where the disk has not that much room.
     """
 
-    def __init__(self, path: Path, clock: Clock, *, mode: Mode = "inline", flush_s: float = FLUSH_S) -> None:
+    def __init__(
+        self,
+        path: Path,
+        clock: Clock,
+        *,
+        mode: Mode = "inline",
+        flush_s: float = FLUSH_S,
+        planned_s: float | None = None,
+        samples_per_s: float | None = None,
+    ) -> None:
+        must_fit(path.parent, need_bytes(planned_s, samples_per_s))
         claim(path)
         self.path = path
         self._clock = clock
@@ -246,7 +260,12 @@ def _open_store(path: Path, mode: Mode, epoch_ns: int, flush_ns: int) -> Store:
         from bench.recording.process_store import ProcessStore
 
         return ProcessStore(path, epoch_ns, flush_ns)
-    return InlineStore(path, epoch_ns, flush_ns)
+    try:
+        return InlineStore(path, epoch_ns, flush_ns)
+    except OSError as error:
+        raise InputError(
+            str(path), f"cannot be written ({error.strerror})", "make room, or name another folder"
+        ) from None
 
 
 def _media_type(name: str) -> str:

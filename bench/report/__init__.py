@@ -3,12 +3,13 @@
 from bench.report.compare import write_comparison
 from bench.report.page import write_report
 from bench.report.planned import write_plan
-from bench.report.view import Curve, Evidence, FitView, Plan, PlanView
+from bench.report.view import Curve, Evidence, FitView, OverTimes, Plan, PlanView
 
 __all__ = [
     "Curve",
     "Evidence",
     "FitView",
+    "OverTimes",
     "Plan",
     "PlanView",
     "write_comparison",

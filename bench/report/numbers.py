@@ -32,8 +32,10 @@ def meaning(name: str) -> str:
         return "share that never relaxes" if index == "0" else f"share of relaxation mode {index}"
     if head == "nu" and index.isdigit():
         return f"rate of relaxation mode {index}"
-    if head in ("alpha", "a") and index.isdigit():
+    if head == "alpha" and index.isdigit():
         return markup.raised(f"coefficient of δ^{index}") if index != "1" else "coefficient of δ"
+    if head in ("a", "b") and index.isdigit():
+        return f"of the filter (13), {'denominator' if head == 'a' else 'numerator'}"
     if head in ("F", "force") and index.isdigit():
         return f"elastic force at point {index}"
     return ""

@@ -9,7 +9,7 @@ from pathlib import Path
 from bench.diagnose import words
 from bench.diagnose.result import Diagnosis
 from bench.recording.types import Event, Recording
-from bench.report import axes, curves, facts, markup, numbers, plots, verdict
+from bench.report import axes, curves, facts, markup, numbers, plots, scheme, verdict
 from bench.report import diagnosis as diagnosis_page
 from bench.report.markup import digits, figure, forces, section
 from bench.report.verdict import Verdict
@@ -73,6 +73,7 @@ def report_page(
         ("indentation", "Force against indentation", _indentation(recording, fit)),
         ("corner", "The fastest ramp, enlarged", _corner(recording, fit)),
         ("model", "Model", _model(fit)),
+        ("method", "Method", scheme.section(fit)),
         *(diagnosis_page.sections(diagnosis, short=True) if diagnosis is not None else []),
         ("structures", "Structures tried", numbers.evidence(fit.evidence) if fit else ""),
         ("touch-off", "Tare and touch-off", facts.touch_off(recording)),

@@ -43,12 +43,28 @@ class Evidence:
 
 
 @dataclass(frozen=True)
+class OverTimes:
+    """A discrete fit at other sample times: `T` (n,) in s; `numbers`: of the law by name, (n,), NaN where refused;
+    `rates` (n, r) in 1/s, NaN where the filter is no relaxation; `physical` (n,); `chosen`: the T of the fit shown;
+    `refused`: why, by T."""
+
+    T: Array
+    numbers: Mapping[str, Array]
+    rates: Array
+    physical: NDArray[np.bool_]
+    chosen: float
+    refused: Mapping[float, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class FitView:
     """A fit as the report shows it.
 
     `json`: the content of fit.json (docs/formats.md). `time_s`, `position_mm` (pad frame), `measured_N`, `simulated_N`:
     shape (n,), at the force stamps, on the recording's clock; outside `fit_from_s` … `fit_to_s` they are history that
     cost nothing. `elastic`: F^e in N over depth in mm; `relaxation`: g over s. `evidence`: the structures tried.
+    `history`: how an iterative method converged, `V` in N² and the numbers by name, one entry an iteration (at `time_s`
+    where it follows the run); `over_times`: a discrete fit at other sample times.
     """
 
     json: Mapping[str, Any]
@@ -62,6 +78,8 @@ class FitView:
     relaxation: Curve | None = None
     evidence: Sequence[Evidence] = ()
     notes: Sequence[str] = ()
+    history: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    over_times: OverTimes | None = None
 
     def number(self, key: str) -> float:
         """A figure of fit.json; NaN where it is missing or null."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from bench.errors import Stopped
 from bench.protocol import Approach
 from bench.run.loop import Loop, Script, Window
 from bench.run.motion import Mover
+from bench.run.safety import ZERO_LOST_SHARE
 from bench.run.touchoff import MIN_SAMPLES_IN_CONTACT, Air, Surface, air_of, surface_in_pieces, threshold_N
 
 TARE_S = 1.0
@@ -28,6 +31,14 @@ BEYOND_MM = 0.3
 RECOVER_S, RECOVER_TIMES = 0.5, 5.0
 """Rest between two approaches, so that the last touch relaxes: at least so long, and so many times as long as it
 lasted. What has not relaxed keeps the surface lower than it was."""
+
+TARE_KEEPS_S = 600.0
+"""A zero older than that is not touched off with: a load cell drifts with the room in minutes."""
+
+AIR_S = 0.05
+"""How long a force below the tare is looked at before it is believed."""
+
+NOT_WATCHED = "the cell's readings repeat in air for longer than a frozen cell could be told by: give it more decimals"
 
 MOST_PASSES = 4
 """The slow approach is repeated from further above, twice as long each time, where it began too near or in the pad."""
@@ -69,7 +80,10 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float) 
             f"the force is not steady in air ({air.drift_N_s:+.3f} N/s): the probe touches something, "
             "or the load cell is still warming up; no zero can be taken"
         )
-    loop.tare_N = air.mean_N
+    loop.tare_N, loop.tared_s = air.mean_N, loop.clock.now()
+    loop.monitor.tared()
+    if not loop.monitor.frozen.learned():
+        loop.sink.event(loop.clock.now(), "frozen_not_watched", {"message": NOT_WATCHED})
     loop.sink.event(
         loop.clock.now(),
         "tare",
@@ -88,9 +102,11 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float) 
 def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_sigma_mm: float) -> Script[Surface]:
     """Find the surface: a first approach feels it, a second, slower one measures it.
 
-    Raises `Stopped` where there is contact at once, or none within the travel allowed.
+    Raises `Stopped` where there is contact at once, or none within the travel allowed, and where the tare is too old
+    or no zero any more.
     """
     limit = threshold_N(approach.force, air)
+    _fresh_tare(loop)
     start = mover.here()
     deepest = loop.monitor.envelope.deepest_mm
     window = mover.watch()
@@ -112,6 +128,7 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
     begin = max(start, _in_air_mm(felt, rough, approach))
     rest_s = RECOVER_S
     for _ in range(MOST_PASSES):
+        _fresh_tare(loop)
         yield from mover.go(begin, approach.speed)
         yield from loop.sleep(rest_s)
         surface = yield from _slow_approach(loop, mover, approach, air, felt, position_sigma_mm)
@@ -178,16 +195,39 @@ def _above(loop: Loop, limit_N: float) -> _TwoInARow:
     return _TwoInARow(loop, limit_N)
 
 
+def _fresh_tare(loop: Loop) -> None:
+    age_s = loop.clock.now() - loop.tared_s
+    if not age_s <= TARE_KEEPS_S:  # never taken: not a number
+        raise Stopped(f"the tare is {age_s / 60.0:.0f} min old, more than {TARE_KEEPS_S / 60.0:g}: take it again")
+
+
 class _TwoInARow:
-    """Two samples in a row at or above a force: one alone may be an outlier."""
+    """Two samples in a row at or above a force: one alone may be an outlier.
+
+    A probe on its way to the pad is in air. Where that reads far less than the tare, contact would be noticed late by
+    as much: raises `Stopped`.
+    """
 
     def __init__(self, loop: Loop, limit_N: float) -> None:
         self.loop = loop
         self.limit_N = limit_N
         self.before = False
+        self.least_N = max(10.0 * limit_N, ZERO_LOST_SHARE * loop.monitor.envelope.force_N)
+        self.below_s = math.nan
 
     def __call__(self) -> bool:
         """Asked once for every force sample."""
+        net_N, now_s = self.loop.last_net_N, self.loop.clock.now()
+        if net_N >= -self.least_N:
+            self.below_s = math.nan
+        elif math.isnan(self.below_s):
+            self.below_s = now_s
+        elif now_s - self.below_s > AIR_S:
+            self.loop.monitor.cell_lost = True  # nobody knows what this force means
+            raise Stopped(
+                f"the force fell to {net_N:.3f} N on the way to the pad: the zero has moved since the tare, or the "
+                "cell's sign is wrong (load_cell.sign)"
+            )
         now = self.loop.last_net_N >= self.limit_N
         both = now and self.before
         self.before = now

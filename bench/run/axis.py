@@ -19,6 +19,13 @@ from drivers.motor import Motor, MotorSample
 from drivers.registers import RegisterMotor
 from drivers.wire import Exchange, Pause, Steps
 
+SEGMENT_S = 0.2
+"""A motor without a watchdog is told no more of a move than it makes in that time (and the way to stand still after
+it): so far it goes on when the host is gone. Half of it is left when it is told more."""
+
+SEGMENT_MM = 0.1
+"""And no less than that, for slow moves: ten counts of an IAI controller."""
+
 
 class Curve(Protocol):
     """A planned motion: positions in mm, motor frame, `t` in seconds from its start."""
@@ -111,6 +118,9 @@ class Axis:
         self._start_s = 0.0
         self._next_s = 0.0
         self._waiting: deque[tuple[Exchange[MotorSample], float]] = deque()
+        self._goal_mm = 0.0
+        self._move: tuple[float, float] = (0.0, 0.0)
+        self._unwatched = isinstance(motor, RegisterMotor) and not motor.has_watchdog
         self._steps: Steps[Any] | None = None
         self._item: Exchange[Any] | Pause | None = None
         self._pause_until_s = 0.0
@@ -141,13 +151,15 @@ class Axis:
         return self._curve.velocity(now_s - self._start_s)
 
     def ended(self, now_s: float) -> bool:
-        """Whether the planned profile is over, and a move motor has taken it."""
-        return self._steps is None and now_s - self._start_s >= self._curve.duration_s
+        """Whether the planned profile is over, and a move motor has taken it to its end."""
+        told = self.motor.kind == "stream" or self._goal_mm == self._curve.end_mm
+        return told and self._steps is None and now_s - self._start_s >= self._curve.duration_s
 
     def go_live(self, position_mm: float) -> None:
         """Begin to feed (or poll) the motor, holding a position."""
         now = self.clock.now()
         self._curve = Rest(position_mm)
+        self._goal_mm = position_mm
         self._start_s = now
         self._next_s = now
         self.live = True
@@ -158,7 +170,36 @@ class Axis:
         self._start_s = self.clock.now()
         if self.motor.kind == "move":
             self._telling = (self._start_s, self._as_written(curve.end_mm, speed_mm_s, acceleration_mm_s2))
-            self._begin(self.motor.move(curve.end_mm, speed_mm_s, acceleration_mm_s2))
+            self._move = (speed_mm_s, acceleration_mm_s2)
+            self._goal_mm = self._segment_end(SEGMENT_S)
+            self._begin(self.motor.move(self._goal_mm, speed_mm_s, acceleration_mm_s2))
+
+    def _segment_end(self, ahead_s: float) -> float:
+        """As far as the motor may be told to go by itself, having followed its profile for so long: to rest from there.
+
+        Told more before it brakes for that end, it makes the one profile that it would have made of the whole move.
+        """
+        curve = self._curve
+        if not self._unwatched:
+            return curve.end_mm
+        speed_mm_s, acceleration_mm_s2 = self._move
+        ahead_s = max(ahead_s, SEGMENT_MM / speed_mm_s)
+        at_s = max(self.clock.now() - self._start_s, 0.0) + ahead_s
+        velocity = curve.velocity(at_s)
+        end = curve.position(at_s) + math.copysign(0.5 * velocity * velocity / acceleration_mm_s2, velocity)
+        left = curve.end_mm - end
+        # What is left is told with the rest where it is less than a segment, and where rounding passed the end.
+        near = abs(left) <= max(SEGMENT_MM, abs(velocity) * 0.5 * SEGMENT_S) or at_s >= curve.duration_s
+        return curve.end_mm if near else end
+
+    def _tell_more(self, now_s: float) -> None:
+        """The next segment of a move, when half of the last one is left."""
+        speed_mm_s, acceleration_mm_s2 = self._move
+        braking_mm = 0.5 * speed_mm_s * speed_mm_s / acceleration_mm_s2
+        left_mm = abs(self._goal_mm - self.command(now_s)) - braking_mm
+        if left_mm <= max(0.5 * SEGMENT_S * speed_mm_s, 0.5 * SEGMENT_MM):
+            self._goal_mm = self._segment_end(SEGMENT_S)
+            self._begin(self.motor.move(self._goal_mm, speed_mm_s, acceleration_mm_s2))
 
     def stamp_std_s(self) -> float:
         """Doubt of the polls' stamps: a device looks where it is at some time while it works on its reply, and always
@@ -173,6 +214,7 @@ class Axis:
         velocity = self.velocity(now)
         here = self.command(now)
         self._curve = Braking(here, velocity, deceleration_mm_s2) if velocity else Rest(here)
+        self._goal_mm = self._curve.end_mm
         self._start_s = now
         if self.motor.kind == "move":
             self._note_taken(now)
@@ -190,6 +232,7 @@ class Axis:
     def freeze(self, position_mm: float) -> None:
         """Take a position as commanded from now on (after a move motor was stopped where nobody planned it)."""
         self._curve = Rest(position_mm)
+        self._goal_mm = position_mm
         self._start_s = self.clock.now()
 
     def go_silent(self) -> None:
@@ -212,6 +255,8 @@ class Axis:
         """Submit what is due: the next command or poll, and the next exchange of a running move."""
         if self._steps is not None:
             self._advance(now_s)
+        elif self.live and self._unwatched and self._goal_mm != self._curve.end_mm:
+            self._tell_more(now_s)
         if not self.live or now_s < self._next_s:
             return
         if len(self._waiting) > 1:

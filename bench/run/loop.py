@@ -9,17 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from bench.errors import Stopped
 from bench.recording.types import StepMark
 from bench.run.axis import Axis
 from bench.run.rig import Rig
-from bench.run.safety import Monitor
+from bench.run.safety import LATE_TURN_S, Monitor
+from bench.run.signals import Operator
+from bench.run.watch import HostSleep
 from drivers.errors import DeviceTimeout, DriverError
 from drivers.loadcell import ForceSample
 from drivers.motor import MotorSample
 from drivers.wire import Pause, Port, Steps
+
+if TYPE_CHECKING:
+    from bench.run.foresight import Foresight
 
 T = TypeVar("T")
 Script = Generator[None, None, T]
@@ -83,16 +88,21 @@ class Window:
 class Loop:
     """Rig, axis, monitor and sink, turned until the script ends or something stops it.
 
-    `tare_N` is subtracted from gross readings; `operator_stop` is looked at in every turn.
+    `tare_N` is subtracted from gross readings, `tared_s` when it was taken; `operator` is looked at in every turn.
     """
 
-    def __init__(self, rig: Rig, axis: Axis, monitor: Monitor, sink: Sink) -> None:
+    def __init__(self, rig: Rig, axis: Axis, monitor: Monitor, sink: Sink, operator: Operator | None = None) -> None:
         self.rig = rig
         self.axis = axis
         self.monitor = monitor
         self.sink = sink
         self.clock = rig.clock
+        self.operator = operator if operator is not None else Operator()
+        self.foresight: Foresight | None = None
         self.tare_N = 0.0
+        self.tared_s = math.nan
+        self.late_turns = 0
+        self.longest_turn_s = 0.0
         self.measuring = False
         self.window: Window | None = None
         self.last_force: ForceSample | None = None
@@ -100,21 +110,27 @@ class Loop:
         self.last_motor: MotorSample | None = None
         self.force_count = 0
         self.motor_count = 0
-        self.operator_stop: str | None = None
         self.on_turn: Callable[[float], None] | None = None
         self._force_latency_s = 0.0
         self._failed = 0
+        # A real bench goes on while the computer sleeps; a simulated one sleeps with it.
+        self._sleep = HostSleep() if getattr(self.clock, "watches", False) else None
 
     def run(self, script: Script[T]) -> T:
         """Turn until the script returns; its value comes back.
 
         Raises `Stopped` with the first cause when a limit is crossed, a device fails or the operator stops.
         """
-        rig, axis, clock, links, ports = self.rig, self.axis, self.clock, self.rig.links, self.rig.ports
+        rig, axis, clock, links = self.rig, self.axis, self.clock, self.rig.links
+        ports = self._ports()
         ready: Sequence[Port] = ports
         due_s = [0.0] * len(links)
+        before = clock.now()
         while True:
             now = clock.now()
+            if now - before > LATE_TURN_S or self._sleep is not None:
+                self._judge_turn(now, now - before)
+            before = now
             for link, link_due_s in zip(links, due_s, strict=True):
                 if link_due_s <= now or link.port in ready:
                     link.service()
@@ -138,8 +154,11 @@ class Loop:
                 if due is not None and due < wake:
                     wake = due
             if rig.load_cell.link.broken is not None or rig.motor.link.broken is not None:
-                ports = [link.port for link in links if link.broken is None]  # a lost port would wake us for ever
+                ports = self._ports()
             ready = clock.wait(ports, wake)
+            waker = self.operator.waker
+            if waker is not None and waker in ready:
+                waker.read(64)
 
     def begin_measuring(self) -> None:
         """The load cell is running: from now on its silence counts."""
@@ -151,6 +170,21 @@ class Loop:
         """The load cell is about to be stopped: its silence means nothing any more."""
         self.measuring = False
         self.monitor.expect_force_from(None)
+
+    @property
+    def operator_stop(self) -> str | None:
+        """What the operator (or a signal) wants the run stopped for; set again it is wanted harder."""
+        return self.operator.wish
+
+    @operator_stop.setter
+    def operator_stop(self, wish: str) -> None:
+        self.operator.strike(wish)
+
+    def force_age_s(self, now_s: float) -> float:
+        """How long ago the newest force came, beyond what is normal for the cell; infinity before the first."""
+        if self.last_force is None:
+            return math.inf
+        return now_s - self.last_force.received_s - self._force_latency_s
 
     # -- for scripts -------------------------------------------------------------------------------------------
 
@@ -185,6 +219,23 @@ class Loop:
 
     # -- inside ------------------------------------------------------------------------------------------------
 
+    def _ports(self) -> list[Port]:
+        """What a wait ends for: the ports that are not lost (those would wake us for ever), and a signal."""
+        ports: list[Port] = [link.port for link in self.rig.links if link.broken is None]
+        waker = self.operator.waker
+        if waker is not None and getattr(self.clock, "wall", True):
+            ports.append(waker)
+        return ports
+
+    def _judge_turn(self, now: float, gap_s: float) -> None:
+        """Note a turn that came late, and have it judged; a stopping run only notes it."""
+        slept_s = self._sleep.slept_s() if self._sleep is not None else 0.0
+        if gap_s > LATE_TURN_S or slept_s > LATE_TURN_S:
+            self.late_turns += 1
+            self.longest_turn_s = max(self.longest_turn_s, gap_s)
+            self.sink.event(now, "late_turn", {"gap_s": gap_s, "slept_s": slept_s})
+            self.monitor.turn(gap_s, slept_s)
+
     def _take(self, now: float) -> None:
         """Record and judge everything that has come."""
         monitor, sink = self.monitor, self.sink
@@ -208,6 +259,8 @@ class Loop:
             monitor.motor(reading, command, names, axis.lag_mm(reading.time_s))
             self.last_motor = reading
             self.motor_count += 1
+            if self.foresight is not None:
+                self.foresight.note(reading.time_s, reading.position_mm)
             self._failed = 0
             if window is not None:
                 window.motor_time_s.append(reading.time_s)
@@ -220,20 +273,20 @@ class Loop:
             sink.event(now, "motor_error", {"message": str(failure), "in_a_row": self._failed})
             answered = not isinstance(failure, DeviceTimeout)
             if (answered and self._failed >= MAX_REFUSED) or self.rig.motor.link.broken is not None:
-                monitor.violate(str(failure))
+                monitor.violate(str(failure), "motor")
         if axis.refused is not None:
             sink.event(now, "motor_refused", {"message": str(axis.refused)})
-            monitor.violate(str(axis.refused))
+            monitor.violate(str(axis.refused), "motor")
             axis.refused = None
         broken = self.rig.load_cell.link.broken
         if broken is not None and self.measuring:
-            monitor.violate(str(broken))
+            monitor.violate(str(broken), "cell")
         monitor.time(now, self._force_latency_s, axis.live)
-        if self.operator_stop is not None:
-            monitor.violate(self.operator_stop)
+        if self.operator.wish is not None:
+            monitor.violate(self.operator.wish, "operator")
         problem = sink.problem()
         if problem is not None:
-            monitor.violate(f"the recording cannot go on: {problem}")
+            monitor.violate(f"the recording cannot go on: {problem}", "host")
 
     @property
     def last_gross_N(self) -> float:

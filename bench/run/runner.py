@@ -8,12 +8,10 @@ import hashlib
 import importlib.metadata
 import math
 import platform
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import Literal
 
 import yaml
@@ -22,18 +20,20 @@ from bench.config import Bench
 from bench.errors import InputError, Stopped
 from bench.plan import Plan
 from bench.protocol import Protocol
-from bench.rates import motor_rate_Hz
+from bench.rates import force_rate_Hz, motor_rate_Hz
 from bench.recording.writer import Recorder
 from bench.run.axis import Axis
 from bench.run.folder import RECORDING
+from bench.run.foresight import Foresight
 from bench.run.loop import Loop
 from bench.run.rig import Rig, is_simulated, open_rig
-from bench.run.safety import Envelope, Monitor
+from bench.run.safety import Blame, Envelope, Monitor
 from bench.run.script import Findings, Run
+from bench.run.signals import SIGNALS as SIGNALS
+from bench.run.signals import Operator, listening
 from bench.run.touchoff import warm_up
 from drivers.errors import DriverError
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 HOST_PACKAGES = ("padbench", "numpy", "scipy", "numba", "pymodbus", "pyserial", "mcap")
 
 Progress = Callable[[float, str], None]
@@ -89,7 +89,9 @@ def run_protocol(
     except DriverError as error:
         raise InputError(bench.place((error.device, "port")), f"{error.device}: {error.message}") from error
     warm_up()
-    with rig, _undisturbed():
+    operator = Operator()
+    foresight = _foresight(believed_text, plan)
+    with rig, _undisturbed(), listening(operator):  # to the end of the recording: a late signal must not tear it
         virtual = rig.world is not None and not rig.world.clock.wall
         mode: Literal["inline", "process"] = "inline" if virtual else "process"
         with Recorder(folder / RECORDING, rig.clock, mode=mode) as recorder:
@@ -99,14 +101,28 @@ def run_protocol(
                 simulation=rig.world.truth() if rig.world is not None else None,
                 attachments=_attachments(protocol, bench, believed_text),
             )
-            return _run(rig, recorder, protocol, bench, plan, folder, progress)
+            monitor = Monitor(_envelope(bench, plan))
+            monitor.frozen.expect(force_rate_Hz(bench, protocol.sampling.load_cell), bench.limits.stale)
+            rate = motor_rate_Hz(bench, protocol.sampling.motor)
+            loop = Loop(rig, Axis(rig.motor, 1.0 / rate), monitor, recorder, operator)
+            if rig.world is not None:
+                from bench.run.simulated import overheard
+
+                loop.sink = overheard(recorder, rig.world)
+            loop.foresight = foresight
+            return _run(rig, loop, recorder, protocol, bench, plan, folder, progress)
 
 
 def _run(
-    rig: Rig, recorder: Recorder, protocol: Protocol, bench: Bench, plan: Plan, folder: Path, progress: Progress | None
+    rig: Rig,
+    loop: Loop,
+    recorder: Recorder,
+    protocol: Protocol,
+    bench: Bench,
+    plan: Plan,
+    folder: Path,
+    progress: Progress | None,
 ) -> Outcome:
-    rate = motor_rate_Hz(bench, protocol.sampling.motor)
-    loop = Loop(rig, Axis(rig.motor, 1.0 / rate), Monitor(_envelope(bench, plan)), recorder)
     run = Run(loop, protocol, bench, plan)
     started = rig.clock.now()
     if progress is not None:
@@ -114,18 +130,20 @@ def _run(
         loop.on_turn = lambda now: tell(now - started, run.label)
     cause: str | None = None
     failure: Exception | None = None
-    with _operator_stop(loop):
-        try:
-            loop.run(run.phases())
-        except Stopped as stop:
-            cause = stop.cause
-        except InputError:
-            raise  # no device was reached, none was commanded
-        except Exception as error:  # a defect of ours: the motor is stopped all the same, then it is told
-            cause, failure = f"a defect of padbench: {type(error).__name__}: {error}", error
-        if cause is not None:
-            recorder.log("error", cause)
-            _wind_down(loop, run, cause)
+    try:
+        loop.run(run.phases())
+    except Stopped as stop:
+        cause = stop.cause
+        if loop.monitor.cause is None:  # said by the script: what is crossed from now on is not the first
+            loop.monitor.violate(cause, _blame(stop))
+    except InputError:
+        raise  # no device was reached, none was commanded
+    except Exception as error:  # a defect of ours: the motor is stopped all the same, then it is told
+        cause, failure = f"a defect of padbench: {type(error).__name__}: {error}", error
+        loop.monitor.violate(cause, "run")
+    if cause is not None:
+        recorder.log("error", cause)
+        _wind_down(loop, run, cause)
     seconds = rig.clock.now() - started
     problem = recorder.finish(
         {
@@ -133,6 +151,8 @@ def _run(
             "cause": cause or "",
             "bench_seconds": f"{seconds:.3f}",
             "overruns": loop.axis.overruns,
+            "late_turns": loop.late_turns,
+            "longest_turn_s": f"{loop.longest_turn_s:.4f}",
             "traffic": rig.traffic(),
             "safe_state": run.found.safe_state,
             **({"not_safe": run.found.not_safe} if run.found.not_safe else {}),
@@ -164,24 +184,21 @@ def _undisturbed() -> Iterator[None]:
         gc.unfreeze()
 
 
-@contextmanager
-def _operator_stop(loop: Loop) -> Iterator[None]:
-    """Ctrl-C, SIGTERM and SIGHUP stop the motor and keep the data; the loop sees them in its next turn."""
+def _blame(stop: Stopped) -> Blame:
+    """What a script has stopped for: a device that failed it, or the protocol."""
+    error = stop.__cause__
+    if isinstance(error, DriverError):
+        return "cell" if error.device == "load_cell" else "motor"
+    return "run"
 
-    def on_signal(number: int, frame: FrameType | None) -> None:
-        name = signal.Signals(number).name
-        loop.operator_stop = "stopped by the operator (Ctrl-C)" if name == "SIGINT" else f"stopped by signal {name}"
 
-    try:
-        before = {number: signal.signal(number, on_signal) for number in SIGNALS}
-    except ValueError:  # not the main thread: whoever started it stops it otherwise
-        yield
-        return
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+def _foresight(believed_text: str | None, plan: Plan) -> Foresight | None:
+    """The believed pad beside the run, where there is one and a pad to believe in."""
+    if believed_text is None or plan.in_air:
+        return None
+    from sim.model import Model
+
+    return Foresight(Model.from_dict(yaml.safe_load(believed_text)), plan.limits)
 
 
 def _as_sampled(bench: Bench, protocol: Protocol) -> Bench:
@@ -190,7 +207,7 @@ def _as_sampled(bench: Bench, protocol: Protocol) -> Bench:
     if rate is None:
         return bench
     update: dict[str, object] = {"rate": rate}
-    if bench.load_cell.driver == "dad141":
+    if bench.load_cell.driver in ("dad141", "mt_sics"):
         update["mode"] = "poll"
     return bench.model_copy(update={"load_cell": bench.load_cell.model_copy(update=update)})
 
@@ -206,6 +223,7 @@ def _envelope(bench: Bench, plan: Plan) -> Envelope:
         following_error_mm=limits.following_error,
         stale_s=limits.stale,
         depth_mm=plan.limits.depth_mm if not plan.in_air else math.inf,
+        moving_mass_kg=bench.motor.moving_mass,
     )
 
 

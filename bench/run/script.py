@@ -20,18 +20,16 @@ from bench.run.approach import tare, touch_off
 from bench.run.force import hold_force, press
 from bench.run.loop import Loop, Script
 from bench.run.motion import Mover, Shape
+from bench.run.stopping import Stopping
 from bench.run.touchoff import Air, Surface
 from drivers.errors import DriverError
 from drivers.motor import MotorLimits, MotorSample
 
 SLOW_MM_S = 5.0
-"""Speed of moves that no protocol asks for (backing off before the tare, retracting after a stop)."""
+"""Speed of moves that no protocol asks for (backing off before the tare)."""
 
 INSIDE_MM = 0.05
 """How far inside the travel an axis is set that was homed outside of it."""
-
-STOP_PATIENCE_S = 1.0
-"""How long a stopping axis is waited for before the safe state is applied all the same."""
 
 REST_MM_S = 1.0
 """A free axis that is slower than this stands: the encoder's steps over `REST_S` are less."""
@@ -58,6 +56,9 @@ class Findings:
     air: Air | None = None
     surface: Surface | None = None
     surface_mm: float = 0.0
+    air_mm: float | None = None
+    """Where the tare was taken (motor frame): a place that is known to be air."""
+
     safe_state: dict[str, Any] | None = None
     not_safe: str = ""
     """Why nobody can say that the motor is in its safe state; empty where it was read back."""
@@ -143,6 +144,7 @@ class Run:
         self.label = "tare"
         self._mark("tare", "tare", "air")
         found.air = yield from tare(loop, self.mover, approach, SLOW_MM_S)
+        found.air_mm = self.mover.here()
         self.label = "approach"
         self._mark("approach", "approach", "ramp", speed_mm_s=approach.speed)
         surface = yield from touch_off(loop, self.mover, approach, found.air, self._position_doubt(approach))
@@ -156,6 +158,8 @@ class Run:
                 f"beyond limits.position ({envelope.position_mm[1]:g} mm); move the pad, or allow more travel"
             )
         envelope.surface_mm = surface.position_mm
+        if loop.foresight is not None:
+            loop.foresight.start(surface.position_mm)
         yield from self.mover.go(self._motor_frame(self.plan.start_mm), approach.speed)
 
     def segment(self, segment: Segment) -> Script[None]:
@@ -167,6 +171,9 @@ class Run:
             target = mover.here() - self.found.surface_mm
         self._mark(segment.name, segment.phase, segment.kind, target, segment.speed_mm_s)
         if segment.kind == "ramp":
+            if loop.foresight is not None:
+                here = mover.here() - self.found.surface_mm
+                loop.foresight.allow(segment.name, mover.shape.profile(here, target, segment.speed_mm_s))
             yield from mover.go(self._motor_frame(segment.target_mm), segment.speed_mm_s)
         elif segment.kind == "force_ramp":
             away = self._motor_frame(self.plan.start_mm)
@@ -189,31 +196,15 @@ class Run:
             return  # nothing was commanded, and nobody knows what is at the end of the line: it stays so
         self.found.safe_state = yield from loop.perform(self.motor.safe_state(state))
         loop.sink.event(self.clock.now(), "safe_state", {"asked": state, **self.found.safe_state})
-        yield from self._quieten()
+        yield from self.quieten()
 
     def wind_down(self, cause: str) -> Script[None]:
-        """After a stop: decelerate, then the safe state. Nothing here lets an error hide the first cause."""
-        loop = self.loop
-        loop.sink.event(self.clock.now(), "stopped", {"cause": cause})
+        """After a stop: softly or hard, then the safe state. Nothing here lets an error hide the first cause."""
+        self.loop.sink.event(self.clock.now(), "stopped", {"cause": cause})
         self.label = "stopping"
-        if loop.axis.live:
-            give_up = self.clock.now() + STOP_PATIENCE_S
-            loop.axis.clear_queue()
-            loop.axis.halt(self.bench.limits.acceleration)
-            while not loop.axis.ended(self.clock.now()) and self.clock.now() < give_up:
-                yield
-            if self.bench.motor.safe_state == "retract" and self.motor.link.broken is None:
-                yield from self._retract()
-        try:
-            yield from self.make_safe()
-        except DriverError as error:
-            self.found.not_safe = str(error)
-            loop.sink.event(self.clock.now(), "safe_state_failed", {"message": str(error)})
-            yield from self._quieten()
+        yield from Stopping(self).stop()
 
-    # -- inside ------------------------------------------------------------------------------------------------
-
-    def _quieten(self) -> Script[None]:
+    def quieten(self) -> Script[None]:
         """End the load cell's stream; that it does not listen is noted, and harms nobody."""
         loop, cell = self.loop, self.loop.rig.load_cell
         loop.end_measuring()
@@ -221,6 +212,8 @@ class Run:
             yield from loop.perform_on(cell.stop(), cell.link)
         except DriverError as error:
             loop.sink.event(self.clock.now(), "load_cell_not_stopped", {"message": str(error)})
+
+    # -- inside ------------------------------------------------------------------------------------------------
 
     def _await_rest(self) -> Script[None]:
         """A free axis may be moving (a pad pushes it out, a vertical one sinks): it is not caught in flight."""
@@ -289,19 +282,6 @@ class Run:
         yield from self.mover.settle()
         envelope.position_mm = allowed
         loop.sink.event(self.clock.now(), "homed", {"home_mm": home_mm, "position_mm": self.mover.here()})
-
-    def _retract(self) -> Script[None]:
-        """Out of the pad, slowly, as far as where the run started or the travel ends."""
-        lowest = self.loop.monitor.envelope.position_mm[0]
-        retract = self.protocol.approach.retract if isinstance(self.protocol.approach, Approach) else 0.0
-        target = self.found.surface_mm - retract if self.found.surface is not None else self.mover.here() - retract
-        target = min(max(lowest, target), self.mover.here())
-        give_up = self.clock.now() + 10.0
-        for _ in self.mover.go(target, SLOW_MM_S):
-            if self.clock.now() > give_up:
-                return
-            yield
-        yield from self.mover.settle()  # the plan is over before an axis that lags is
 
     def _clamps(self) -> MotorLimits:
         limits = self.bench.limits

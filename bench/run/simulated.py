@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import contextlib
+import os
+from typing import TYPE_CHECKING, Any, Literal
 
 from bench.config import Bench, load_model
 from bench.errors import InputError
 from drivers.regmap import load_map
 from drivers.spec import LoadCellSpec, MotorSpec
+from sim.faults import FaultError
 from sim.world import World, WorldSettings, register
+
+if TYPE_CHECKING:
+    from bench.recording.types import StepMark
+    from bench.recording.writer import Recorder
 
 
 def world_of(bench: Bench, clock: Literal["virtual", "wall"] | None = None) -> World:
@@ -41,11 +48,51 @@ def world_of(bench: Bench, clock: Literal["virtual", "wall"] | None = None) -> W
                 faults=truth.faults,
             )
         )
+    except FaultError as error:
+        path: tuple[str | int, ...] = ("simulation", "faults", error.index)
+        raise InputError(bench.place(path), f"simulation.faults[{error.index}]: {error.message}", error.cure) from None
     except ValueError as error:
-        part = ("simulation", "faults") if truth.faults else ("simulation",)
-        raise InputError(bench.place(part), str(error)) from error
+        raise InputError(bench.place(("simulation",)), str(error)) from error
     register(world)
     return world
+
+
+class Overheard:
+    """A run's recorder, with a simulated bench that hears which step begins: faults may wait for it."""
+
+    def __init__(self, recorder: Recorder, world: World) -> None:
+        self.motor, self.force, self.event = recorder.motor, recorder.force, recorder.event
+        self.tick, self.problem = recorder.tick, recorder.problem
+        self._step = recorder.step
+        self._world = world
+
+    def step(self, mark: StepMark) -> None:
+        """A stretch of the run begins."""
+        self._step(mark)
+        self._world.step_begins(mark.name)
+
+
+def overheard(recorder: Recorder, world: World) -> Recorder | Overheard:
+    """Where samples and events go: the recorder, and where the bench is to have faults, it hears of the steps too.
+
+    The fault `disk_full` is of this recorder's file.
+    """
+    if not world.settings.faults:
+        return recorder
+    world.host_acts["disk_full"] = lambda: _fill_disk(recorder)
+    return Overheard(recorder, world)
+
+
+def _fill_disk(recorder: Recorder) -> None:
+    """From now on the system itself answers every write to the recording with "no space left on device"."""
+    wanted = recorder.path.stat()
+    full = os.open("/dev/full", os.O_WRONLY)
+    for number in range(3, 1024):
+        with contextlib.suppress(OSError):
+            found = os.fstat(number)
+            if (found.st_dev, found.st_ino) == (wanted.st_dev, wanted.st_ino):
+                os.dup2(full, number)
+    os.close(full)
 
 
 def _device(spec: MotorSpec | LoadCellSpec, kind: Literal["motor", "load_cell"]) -> dict[str, Any]:

@@ -16,7 +16,10 @@ from sim.devices.dad141 import Dad141
 from sim.devices.dad141_modbus import Dad141Modbus
 from sim.devices.drive import Drive
 from sim.devices.iai import Iai
+from sim.devices.laumas import Laumas
+from sim.devices.mt_sics import MtSics
 from sim.devices.orca import Orca
+from sim.devices.smc_lec import SmcLec
 from sim.line import Line
 from sim.noise import GaussianNoise
 
@@ -90,6 +93,13 @@ def _iai(spec: Settings, clock: SimClock, plant: BenchPlant, noise: GaussianNois
     return line, Iai(line, drive, address=int(spec.get("address") or 1), max_speed_mm_s=max_speed_mm_s)
 
 
+def _smc_lec(spec: Settings, clock: SimClock, plant: BenchPlant, noise: GaussianNoise) -> tuple[Line, object]:
+    line = Line(clock, int(_link(spec, "baudrate", 38400)), str(_link(spec, "parity", "N")), half_duplex=True)
+    drive = Drive(clock, plant, noise, direction=int(spec.get("direction") or 1), quantum_mm=0.01)
+    max_speed_mm_s = float(spec.get("max_speed") or 2000.0)
+    return line, SmcLec(line, drive, address=int(spec.get("address") or 1), max_speed_mm_s=max_speed_mm_s)
+
+
 def _dad141(spec: Settings, clock: SimClock, amplifier: Amplifier) -> tuple[Line, object]:
     line = Line(clock, int(spec.get("baudrate") or 115200), str(spec.get("parity") or "N"))
     return line, Dad141(line, amplifier, address=int(spec.get("address") or 0))
@@ -103,13 +113,26 @@ def _dad141_modbus(spec: Settings, clock: SimClock, amplifier: Amplifier) -> tup
     return line, Dad141Modbus(line, amplifier, address=1 if address is None else int(address), tcp=tcp)
 
 
+def _mt_sics(spec: Settings, clock: SimClock, amplifier: Amplifier) -> tuple[Line, object]:
+    line = Line(clock, int(spec.get("baudrate") or 9600), str(spec.get("parity") or "N"))
+    return line, MtSics(line, amplifier, unit=str(spec.get("unit") or "N"))
+
+
+def _laumas(spec: Settings, clock: SimClock, amplifier: Amplifier) -> tuple[Line, object]:
+    line = Line(clock, int(_link(spec, "baudrate", 9600)), str(_link(spec, "parity", "N")), half_duplex=True)
+    return line, Laumas(line, amplifier, address=int(spec.get("address") or 1))
+
+
 _MOTORS: dict[str, Callable[[Settings, SimClock, BenchPlant, GaussianNoise], tuple[Line, object]]] = {
     "orca": _orca,
     "iai": _iai,
+    "smc_lec": _smc_lec,
 }
 _LOAD_CELLS: dict[str, Callable[[Settings, SimClock, Amplifier], tuple[Line, object]]] = {
     "dad141": _dad141,
     "dad141_modbus": _dad141_modbus,
+    "laumas_tlb": _laumas,
+    "mt_sics": _mt_sics,
 }
 
 __all__ = ["device_name", "load_cell_device", "motor_device"]

@@ -70,6 +70,8 @@ class Amplifier:
         self.no_motion_counts = 20
         self.no_motion_ms = 1000
         self.on_output: Callable[[float], None] | None = None
+        self.distortions: list[Callable[[float, float], float]] = []
+        """What faults make of a reading (N, time), one after the other."""
         self.zero = 0
         self.tare = 0
         self.zeroed = self.tared = False
@@ -175,6 +177,8 @@ class Amplifier:
         sensed_N = plant.sensed_force_N(at_s) + self.drift_N_s * at_s + self.noise.draw()
         force_N = plant.plant.sample(at_s - self._sampled_s, sensed_N)
         self._sampled_s = at_s
+        for distort in self.distortions:
+            force_N = distort(force_N, at_s)
         return min(max(force_N, -self.limit_N), self.limit_N)
 
     def _decimation(self) -> int:

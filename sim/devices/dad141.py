@@ -39,6 +39,8 @@ class Dad141:
         self.calibration_open = False
         self.calibration_counter = 17
         self.lines_sent = 0
+        self.refuse: Callable[[float], int | None] | None = None
+        """A fault: commands at a time are answered with `ERR` where this gives a number."""
         self._buffer = bytearray()
         self._stream: Callable[[float], str] | None = None
         self._line_event: Event | None = None
@@ -69,6 +71,9 @@ class Dad141:
         if not self._listening(name, argument):
             return
         reply_s = at_s + REPLY_DELAY_S + self.transmit_delay_ms * 1e-3
+        if self.refuse is not None and self.refuse(at_s) is not None:
+            self._write("ERR", reply_s)
+            return
         if name in _CONTINUOUS and not argument:
             self._halt_stream()
             self._stream = getattr(self, _CONTINUOUS[name])
@@ -233,6 +238,15 @@ class Dad141:
         self.amplifier.reset_zero()
         self.calibration_open = False
         return "OK"
+
+    def power_up(self, at_s: float) -> None:
+        """The device starts anew: silent, without tare and zero."""
+        self._halt_stream()
+        self._buffer.clear()
+        self.open = self.address == 0
+        self.calibration_open = False
+        self.amplifier.reset_tare()
+        self.amplifier.reset_zero()
 
     # -- strings -----------------------------------------------------------------------------------------------
 

@@ -39,6 +39,8 @@ class Drive:
         self.quantum_mm = quantum_mm
         self.zero_mm = 0.0
         self.force_limit_N = plant.settings.max_force_N
+        self.distortions: list[Callable[[float], float]] = []
+        """What faults make of the encoder's readings (mm, motor frame), one after the other."""
         self._noise = noise
         self._tick: Event | None = None
         self._pushing = False
@@ -51,6 +53,8 @@ class Drive:
     def counts(self) -> int:
         """Position as the encoder reads it now, in device counts."""
         reading_mm = self.plant.reported_position_mm + self._noise.draw()
+        for distort in self.distortions:
+            reading_mm = distort(reading_mm)
         return round(self.direction * (reading_mm - self.zero_mm) / self.quantum_mm)
 
     def speed_mm_s(self) -> float:

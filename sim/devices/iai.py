@@ -204,6 +204,25 @@ class Iai(RegisterAxis):
         if self.mover.servo_on:
             self.mover.stop()
 
+    def fail(self, code: int, at_s: float) -> None:
+        """An alarm from outside (overload, heat): the servo goes off; 0 takes it back."""
+        self.drive.plant.advance(at_s)
+        if code:
+            self._raise(code, at_s)
+            self.mover.switch(False)
+        else:
+            self.alarm = 0
+
+    def power_up(self, at_s: float) -> None:
+        """The controller starts anew: servo off, not homed, counting from where it is."""
+        self.drive.plant.advance(at_s)
+        self.mover.switch(False)
+        self.mover.homed = self.mover.paused = False
+        self.alarm = 0
+        self.modbus_commands = False
+        self.values[DRG1] = self.values[DRG2] = 0
+        self.drive.zero_mm = self.drive.plant.position_mm
+
     def _allowed(self, needs_home: int | None, at_s: float) -> bool:
         """Whether a motion may start; raises the alarm that says why not (`needs_home`: its code, if unhomed)."""
         mover = self.mover

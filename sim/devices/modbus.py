@@ -169,6 +169,8 @@ class RtuServer:
         self.address = address
         self.functions = functions
         self.delay_s = delay_s
+        self.refuse: Callable[[float], int | None] | None = None
+        """A fault: the exception code with which requests at a time are answered, if they are."""
         self.bus_messages = 0
         self.bus_errors = 0
         self.exceptions = 0
@@ -217,7 +219,7 @@ class RtuServer:
         self.messages += 1
         pdu = frame[1:-2]
         delay_s = self.delay_s(pdu)
-        reply = answer(self.functions, pdu, at_s)
+        reply = answer(self.functions, pdu, at_s, self.refuse)
         if reply[0] & 0x80:
             self.exceptions += 1
         if address == BROADCAST:
@@ -235,6 +237,7 @@ class TcpServer:
         self.line = line
         self.functions = functions
         self.delay_s = delay_s
+        self.refuse: Callable[[float], int | None] | None = None
         self.messages = 0
         self._buffer = b""
         line.device = self
@@ -251,16 +254,21 @@ class TcpServer:
                 break
             pdu, buffer = buffer[7 : 6 + length], buffer[6 + length :]
             self.messages += 1
-            reply = answer(self.functions, pdu, at_s)
+            reply = answer(self.functions, pdu, at_s, self.refuse)
             head = struct.pack(">HHHB", transaction, 0, len(reply) + 1, unit)
             self.line.device_write(head + reply, at_s + self.delay_s(pdu))
         self._buffer = buffer
 
 
-def answer(functions: dict[int, Function], pdu: bytes, at_s: float) -> bytes:
-    """The reply's PDU: the function's, or an exception."""
+def answer(
+    functions: dict[int, Function], pdu: bytes, at_s: float, refuse: Callable[[float], int | None] | None = None
+) -> bytes:
+    """The reply's PDU: the function's, or an exception; `refuse(time)` may give the code of one."""
     function = functions.get(pdu[0])
     try:
+        code = refuse(at_s) if refuse is not None else None
+        if code is not None:
+            raise Refusal(code)
         if function is None:
             raise Refusal(ILLEGAL_FUNCTION)
         return function(pdu, at_s)

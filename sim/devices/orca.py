@@ -295,6 +295,29 @@ class Orca:
 
     # -- errors --------------------------------------------------------------------------------------------------
 
+    def fail(self, bits: int, at_s: float) -> None:
+        """Errors from outside (heat, supply): the motor lets go; 0: those pass, and the mode's next command acts."""
+        self.plant.advance(at_s)
+        if bits:
+            self._raise(bits)
+            if bits & _STOPPING:
+                self.drive.release()
+        else:
+            self.errors &= ~_STOPPING | r.COMMS_TIMEOUT
+
+    def power_up(self, at_s: float) -> None:
+        """The motor starts anew: asleep, its registers as after power-up, counting from where it is."""
+        self.plant.advance(at_s)
+        self._enter(r.SLEEP, at_s)
+        self.errors = self.latched = 0
+        force_mN = round(self.plant.settings.max_force_N * 1000.0)
+        delay_us = round(self.delay_s * 1e6)
+        self.registers[:] = r.power_up_values(self.line.baudrate, delay_us, self.server.address, force_mN)
+        self._limit_mN = force_mN
+        self.drive.limit_force(force_mN / 1000.0)
+        self.drive.direction = self._direction
+        self.drive.set_zero_here()
+
     def _set(self, bit: int, active: bool) -> None:
         if active:
             self._raise(bit)

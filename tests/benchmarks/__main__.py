@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tests.benchmarks.report import Section, goal_table, machine
 
-NAMES = ("dry_run", "plant", "wire", "fit", "estimator", "touch_off", "recording", "export")
+NAMES = ("dry_run", "plant", "wire", "stop_latency", "fit", "estimator", "touch_off", "recording", "export")
 """In the order of the page; each is a module of this package with `run() -> Section`."""
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "benchmarks.md"

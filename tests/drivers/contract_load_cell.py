@@ -59,7 +59,7 @@ def check_stop_is_quiet(cell: LoadCell) -> None:
 def check_traffic(cell: LoadCell) -> None:
     """The counters show the bytes, and nothing was bad or refused on a good line."""
     traffic = cell.link.traffic
-    assert traffic.bytes_in > 1000
+    assert traffic.bytes_in > 500  # half a second and more of the slowest, 53 lines of 18 bytes a second
     assert traffic.bytes_out > 0
     assert traffic.exchanges > 0
     assert (traffic.bad_frames, traffic.refusals, traffic.timeouts) == (0, 0, 0)

@@ -1,8 +1,9 @@
 """Devices on pymodbus's own server, in a process of their own: an independent end of the wire for the drivers.
 
-`python -m tests.drivers.modbus_server orca|iai|dad141_modbus` prints the port to open and serves until its input ends.
-Framing, CRC and addressing are pymodbus's; behind them are registers with just enough behaviour (modes, servo, homing,
-a position that follows) for a driver's conversations. Serial devices stand on a pair of pseudo-terminals joined here.
+`python -m tests.drivers.modbus_server orca|iai|smc_lec|dad141_modbus|laumas_tlb` prints the port to open and serves
+until its input ends. Framing, CRC and addressing are pymodbus's; behind them are registers with just enough behaviour
+(modes, servo, homing, a position that follows) for a driver's conversations. Serial devices stand on a pair of
+pseudo-terminals joined here.
 """
 
 from __future__ import annotations
@@ -141,6 +142,89 @@ def iai() -> SimDevice:
     return SimDevice(1, (coils, inputs, holding, unused), action=action)
 
 
+class LecState:
+    """What an LEC's coils and step data do, and the discrete inputs that tell of it (docs/devices.md 2.2)."""
+
+    def __init__(self) -> None:
+        self.coils = dict.fromkeys(range(0x10, 0x40), False)
+        self.seton = False
+        self.held = False
+        self.start = self.target = 0
+        self.began_s = self.ends_s = 0.0
+
+    def now_s(self) -> float:
+        return asyncio.get_running_loop().time()
+
+    def position(self) -> int:
+        if self.now_s() >= self.ends_s:
+            return self.target
+        share = (self.now_s() - self.began_s) / (self.ends_s - self.began_s)
+        return round(self.start + share * (self.target - self.start))
+
+    def move(self, target: int, speed_mm_s: int) -> None:
+        self.start, self.target = self.position(), target
+        self.began_s = self.now_s()
+        self.ends_s = self.began_s + abs(target - self.start) / (100 * speed_mm_s)
+
+    def coil(self, address: int, on: bool) -> None:
+        rising = on and not self.coils[address]
+        self.coils[address] = on
+        if address == 0x30 or not self.coils[0x30]:
+            return
+        if address == 0x1C and rising and self.coils[0x19]:
+            self.seton = True
+            self.move(0, 20)
+        if address == 0x18 and rising:
+            self.target, self.ends_s = self.position(), 0.0
+
+    def begin(self, step: list[int]) -> ExcCodes | None:
+        mode, speed, target = struct.unpack(">HHi", struct.pack(">4H", *step[:4]))
+        ready = self.coils[0x30] and self.coils[0x19] and self.seton and not self.coils[0x18]
+        if not ready or mode != 1 or not speed:
+            return ExcCodes.DEVICE_FAILURE
+        self.move(target, speed)
+        return None
+
+    def inputs(self) -> list[bool]:
+        busy = self.now_s() < self.ends_s
+        return [False] * 8 + [busy, self.coils[0x19], self.seton, not busy] + [False] * 4
+
+
+def smc_lec() -> SimDevice:
+    state = LecState()
+    step = [0] * 16
+
+    async def action(
+        function: int, start: int, address: int, count: int, current: list[int], values: list[Any] | None
+    ) -> ExcCodes | None:
+        if function == 5 and values is not None:
+            state.coil(address, bool(values[0]))
+        elif function == 16 and values is not None and address == 0x9102:
+            step[:] = values
+        elif function == 6 and values is not None and address == 0x9100:
+            return state.begin(step)
+        elif function == 2:
+            current[0] = sum(on << place for place, on in enumerate(state.inputs()))  # 40h to 4Fh, as one word
+        elif function == 3 and 0x9000 <= address <= 0x9005:
+            current[0x9000 - start : 0x9006 - start] = [*words_of("i", state.position()), 0, 0, 0, 0]
+        return None
+
+    coils = [SimData(0x10, values=[False] * 48, datatype=DataType.BITS)]
+    inputs = [SimData(0x40, values=[False] * 16, datatype=DataType.BITS)]
+    holding = [
+        SimData(0x9000, values=[0] * 6, datatype=DataType.REGISTERS),
+        SimData(0x9100, values=[0] * 18, datatype=DataType.REGISTERS),
+    ]
+    unused = [SimData(0, values=[0], datatype=DataType.REGISTERS)]
+    return SimDevice(1, (coils, inputs, holding, unused), action=action)
+
+
+def laumas_tlb() -> SimDevice:
+    """A pull of 1.25: 1250 without point and sign, the sign in bit 7 of the status, which also says stable (bit 11)."""
+    words = [101, 31, 2020, 42, 0, 0, 1 << 7 | 1 << 11, *words_of("I", 1250), *words_of("I", 250), 0, 0, 0]
+    return SimDevice(1, [SimData(0, values=words, datatype=DataType.REGISTERS)])
+
+
 def dad141_modbus() -> SimDevice:
     return SimDevice(
         1,
@@ -165,7 +249,8 @@ def joined_terminals() -> tuple[str, str]:
 
 async def main(name: str) -> None:
     logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
-    device = {"orca": orca, "iai": iai, "dad141_modbus": dad141_modbus}[name]()
+    devices = {"orca": orca, "iai": iai, "smc_lec": smc_lec, "laumas_tlb": laumas_tlb, "dad141_modbus": dad141_modbus}
+    device = devices[name]()
     if name == "dad141_modbus":
         server: Any = ModbusTcpServer(device, address=("127.0.0.1", 0))
         await server.serve_forever(background=True)

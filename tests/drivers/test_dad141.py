@@ -282,8 +282,7 @@ def test_polling_asks_for_the_combined_string() -> None:
     while len(samples) < 2:
         samples += cell.samples()
         due = cell.next_poll_s()
-        assert due is not None
-        link.clock.wait([link.port], min(due, link.wake_at()))
+        link.clock.wait([link.port], link.wake_at() if due is None else min(due, link.wake_at()))
         link.service()
     assert [sample.gross_N for sample in samples] == [pytest.approx(1.1)] * 2
     # Sent at start_s, answered 4 ms later: measured between the request's end and the reply's beginning.

@@ -281,89 +281,6 @@ def test_a_clamp_that_the_device_changes_is_an_error() -> None:
         complete(RegisterMotor(link, with_clamps()).prepare(LIMITS), link)
 
 
-# -- SMC LEC, by YAML alone --------------------------------------------------------------------------------------------
-
-LEC = Path(__file__).parent / "maps" / "smc_lec.yaml"
-MOTION_READ = framed("01 03 90 00 00 06")
-OUTPUTS_READ = framed("01 02 00 40 00 10")
-
-
-def lec_motion(position: int) -> bytes:
-    return framed("01 03 0C " + struct.pack(">iHHi", position, 0, 0, 0).hex(" "))
-
-
-def lec_outputs(*bits: int) -> bytes:
-    word = sum(1 << bit - 0x40 for bit in bits)
-    return framed("01 02 02 " + word.to_bytes(2, "little").hex(" "))
-
-
-def lec(script: Script) -> tuple[RegisterMotor, Link]:
-    link = scripted_link(script)
-    return RegisterMotor(link, load_map("registers", str(LEC), "motor")), link
-
-
-def test_lec_position_of_the_manual() -> None:
-    """150.00 mm is 00 00 3A 98 in the documented reply (7.1), here the first words of the block."""
-    motor, link = lec([(OUTPUTS_READ, lec_outputs(0x48, 0x49)), (MOTION_READ, lec_motion(15000))])
-    sample = call(motor.read(), link)
-    assert sample.position_mm == pytest.approx(150.0)
-    assert sample.moving is True
-    assert sample.fault == 0
-
-
-def test_lec_alarm_from_another_block_is_a_fault() -> None:
-    motor, link = lec([(OUTPUTS_READ, lec_outputs(0x4F)), (MOTION_READ, lec_motion(0))])
-    sample = call(motor.read(), link)
-    assert motor.fault_names(sample.fault) == ("alarm",)
-
-
-def test_lec_move_is_a_block_and_a_start() -> None:
-    block = (
-        "01 10 91 02 00 10 20 00 01 00 32 00 00 04 D2 0B B8 0B B8 00 00 00 00 00 00 00 64 00 00 00 00 00 00 00 00 "
-        "00 00 00 05"
-    )
-    script: Script = [
-        (framed("01 05 00 18 00 00"), framed("01 05 00 18 00 00")),
-        (framed(block), framed("01 10 91 02 00 10")),
-        (framed("01 06 91 00 00 01"), framed("01 06 91 00 00 01")),
-    ]
-    motor, link = lec(script)
-    complete(motor.move(12.34, 50.0, 3000.0), link)
-    assert port_of(link).finished
-
-
-def test_lec_start_is_an_edge() -> None:
-    script: Script = [
-        (framed("01 05 00 18 00 00"), framed("01 05 00 18 00 00")),
-        (
-            framed(
-                "01 10 91 02 00 10 20 00 01 00 32 00 00 04 D2 0B B8 0B B8 00 00 00 00 00 00 00 64 00 00 00 00 00 00 "
-                "00 00 00 00 00 05"
-            ),
-            framed("01 10 91 02 00 10"),
-        ),
-        (framed("01 06 91 00 00 01"), None),
-    ]
-    motor, link = lec(script)
-    with pytest.raises(DeviceTimeout):
-        complete(motor.move(12.34, 50.0, 3000.0), link)
-    assert link.traffic.retries == 0
-
-
-def test_lec_release_is_read_from_discrete_inputs() -> None:
-    off = framed("01 05 00 19 00 00")
-    script: Script = [
-        (off, off),
-        (OUTPUTS_READ, lec_outputs(0x49)),
-        (OUTPUTS_READ, lec_outputs(0x4A)),
-        (OUTPUTS_READ, lec_outputs(0x4A)),
-        (MOTION_READ, lec_motion(0)),
-        (OUTPUTS_READ, lec_outputs(0x4A)),
-    ]
-    motor, link = lec(script)
-    assert complete(motor.safe_state("release"), link)["servo_on"] is False
-
-
 # -- DAD 141.1 over Modbus TCP -----------------------------------------------------------------------------------------
 
 
@@ -441,7 +358,7 @@ def test_every_shipped_map_is_valid_and_says_where_it_is_from() -> None:
 
 def test_a_map_reads_the_same_in_yaml_1_1_and_1_2() -> None:
     """The bench file's reader takes `on` for a word and 010 for ten; nothing in a map may hang on that."""
-    for path in [*(Path(__file__).parents[2] / "drivers" / "maps").glob("*.yaml"), LEC]:
+    for path in (Path(__file__).parents[2] / "drivers" / "maps").glob("*.yaml"):
         for token in yaml.scan(path.read_text("utf-8")):
             if isinstance(token, yaml.ScalarToken) and token.plain:
                 assert token.value.lower() not in ("on", "off", "yes", "no")

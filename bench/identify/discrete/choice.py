@@ -19,9 +19,14 @@ PULLS = 0.03  # of the largest force: a pull beyond it is a bonded pad's
 
 def families(law: str, degree: int | None) -> list[Family]:
     """Laws to try. Raises InputError for one that is not known, and for a degree that does not belong."""
+    if law == "spline":
+        raise InputError(
+            "--law",
+            "a spline has more numbers than these methods can tell from their filter: they take the paper's laws",
+            f"One of: {', '.join((*LAWS, 'auto'))}; `spline` goes with `--method continuous`.",
+        )
     if law not in (*LAWS, "auto"):
-        cure = "`spline` goes with `--method continuous`." if law == "spline" else ""
-        raise InputError("--law", f"there is no law `{law}` here", f"One of: {', '.join((*LAWS, 'auto'))}. {cure}")
+        raise InputError("--law", f"there is no law `{law}`", f"One of: {', '.join((*LAWS, 'auto'))}.")
     if degree is not None and not 1 <= degree <= 8:
         raise InputError("--degree", f"{degree} is no degree of a polynomial to fit", "From 1 to 8.")
     if degree is not None and law not in ("polynomial", "auto"):

@@ -5,14 +5,17 @@ the law to the force samples of the ramp, as measured. Phase (b) is one ARX step
 instrumental variable, which is consistent) over all the data.
 
 **Which ramps.** F = F^e(δ) holds for a pad that has recovered: on a later ramp of a staircase the force starts from
-what relaxation left of it, and γ comes out too soft. So `ramps="recovered"` takes those that begin out of contact after
-a rest (see `phases.REST`); `ramps="all"` is the literal reading: every rising ramp. What either leaves wrong is
-estimated and reported, as a share of F^e at the greatest depth of the ramps:
+what relaxation left of it, and γ comes out too soft. So `ramps="recovered"` takes those that begin out of contact, with
+no creep left that matters (see `phases.MEMORY`), and of them those in which no more than `MOST_LOSS` relaxes;
+`ramps="all"` is the literal reading: every rising ramp. What either leaves wrong is estimated and reported, as a share
+of F^e at the greatest depth:
 
 - `loss_in_ramp`: what relaxes before a ramp has ended, by the step response that was found;
-- `bias_of_all_ramps`: F^e by all rising ramps against F^e by the recovered ones.
+- `bias_of_all_ramps`: F^e by all rising ramps against F^e by the recovered ones;
+- `depth_read`: the depth of the deepest ramp used, of the greatest in the data; beyond it the law is extrapolated;
+- `doubt_at_depth`: the standard error of F^e at the greatest depth, of its value.
 
-A loss of more than `MOST_LOSS` is refused.
+Refused: no such ramp; a loss of more than `MOST_LOSS` in every one; ramps to less than `LEAST_READ` of the depth.
 """
 
 from __future__ import annotations
@@ -39,8 +42,13 @@ from .series import Data
 from .system import Structure
 
 MOST_LOSS = 0.05
+LEAST_READ = 0.2  # of the greatest depth: ramps that end above it say nothing of the rest
+SHALLOW = 0.8  # of the greatest depth: ramps that end above it leave the rest of the law to extrapolation
 MOST_STEPS = 40  # of the instrumental variable
 OTHER = "Use `--method continuous` or `iterative`, which take relaxation into account everywhere."
+WOULD_DO = (
+    "A protocol whose first step goes from air to its greatest depth at 60 mm/s or more would do, as in `long_hold`. "
+)
 
 
 def fit(
@@ -70,6 +78,12 @@ class _Phase:
     y: Array
     pieces: list[tuple[Array, Array]]
 
+    def only(self, kept: list[int]) -> _Phase:
+        """The samples of some of the ramps."""
+        owner = np.repeat(np.arange(len(self.pieces)), [len(t) for t, _ in self.pieces])
+        inside = np.isin(owner, kept)
+        return _Phase(self.u[inside], self.y[inside], [self.pieces[k] for k in kept])
+
 
 def phase_a(data: Data, structure: Structure) -> Array | None:
     """γ by phase (a) on the recovered ramps; None where the data have none."""
@@ -94,30 +108,63 @@ class Fast:
         every = [[r for r in ramps_of(m) if r.rising] for m in data.measurements]
         rested = [[r for r in ramps if r.recovered] for ramps in every]
         phase = _samples(data, structure, every if self.ramps == "all" else rested, self.ramps)
-        fitted, variance = _static(structure, phase)
-        gamma = fitted.x
         noise = noise_of(data.on_grid()).force_N / data.force_N
         left = silent(data, structure, noise)
+        # `start`: a refit on part of the data
+        filter = self._steady(data, structure, phase, left) if start is None else structure.filter(start)
+        phase, loss = self._quick(structure, phase, filter, data.T)
+        fitted, variance = _static(structure, phase)
+        gamma = fitted.x
         v = structure.joined(gamma, self._linear(data, structure, gamma, left))
         V = relative_V(data, structure, v)
         if not np.isfinite(V):
-            raise InputError("fit", f"the ARX filter of order {structure.order} grows without end within these data",
-                             "Try another order, or a longer --sample-time.")  # fmt: skip
+            raise _runs_away(structure)
         covariance: Array = np.asarray(variance * np.linalg.pinv(fitted.matrix), dtype=np.float64)
-        if start is not None:  # a refit on part of the data
+        if start is not None:
             return Found(V, v, 1, True, [(V, v)], gamma_covariance=covariance)
-        steady = v if self.step == "iv" else _instrumental(data, structure, v)
-        loss = _loss(structure, gamma, phase, structure.filter(steady), data.T)
         if loss > MOST_LOSS:
             raise InputError(
                 "--method fast",
                 f"{100 * loss:.0f} % of the force relaxes before the ramps have ended: they do not show the elastic "
                 f"response ({100 * MOST_LOSS:.0f} % at most)",
-                f"Ramps must be quicker. {OTHER}",
+                f"Ramps must be quicker. {WOULD_DO}{OTHER}",
             )
-        figures = {"loss_in_ramp": loss, "bias_of_all_ramps": _bias(data, structure, every, rested)}
+        read = max(float(u.max()) for _, u in phase.pieces)
+        doubt = float(np.sqrt(max(covariance[0, 0], 0.0)) / gamma[0])
+        if read < LEAST_READ:
+            raise InputError(
+                "--method fast",
+                f"its ramps end at {read * data.depth_mm:.2g} mm of {data.depth_mm:.3g}: they say nothing of the rest",
+                WOULD_DO + OTHER,
+            )
+        bias = _bias(data, structure, every, rested)
+        figures = {"loss_in_ramp": loss, "bias_of_all_ramps": bias, "depth_read": read, "doubt_at_depth": doubt}
         notes = self._notes(figures, len(phase.pieces), len(phase.u))
+        if read < SHALLOW:
+            notes.append(
+                f"Its ramps end at {read * data.depth_mm:.3g} mm of {data.depth_mm:.3g} mm: beyond, the law is "
+                f"extrapolated, and at depth in doubt by {100 * doubt:.2g} %. {WOULD_DO.strip()}"
+            )
         return Found(V, v, 1, True, [(V, v)], notes=notes, figures=figures, gamma_covariance=covariance)
+
+    def _steady(self, data: Data, structure: Structure, phase: _Phase, left: list[np.ndarray]) -> Filter:
+        """The step response by which losses are judged: ARX's would be biased, so the instrumental variable's."""
+        gamma = _static(structure, phase)[0].x
+        v = structure.joined(gamma, self._linear(data, structure, gamma, left))
+        if not np.isfinite(relative_V(data, structure, v)):
+            raise _runs_away(structure)
+        return structure.filter(v if self.step == "iv" else _instrumental(data, structure, v))
+
+    def _quick(self, structure: Structure, phase: _Phase, filter: Filter, T: float) -> tuple[_Phase, float]:
+        """The ramps that lose no more than `MOST_LOSS`, or the best one where none does; and the loss of the worst."""
+        losses = _losses(structure, _static(structure, phase)[0].x, phase, filter, T)
+        if self.ramps == "all" or max(losses) <= MOST_LOSS:
+            return phase, max(losses)
+        most = max(MOST_LOSS, min(losses))
+        kept = phase.only([k for k, loss in enumerate(losses) if loss <= most])
+        if len(kept.u) <= structure.nonlinear:  # too few samples for the law
+            return phase, max(losses)
+        return kept, max(_losses(structure, _static(structure, kept)[0].x, kept, filter, T))
 
     def scores(self, data: Data, structure: Structure, v: Array) -> list[Array]:
         """Those of the linear step (γ has its own covariance)."""
@@ -148,9 +195,10 @@ def _samples(data: Data, structure: Structure, ramps: list[list[Ramp]], which: s
     pieces = []
     for m, several in zip(data.measurements, ramps, strict=True):
         depth = np.interp(m.force_time_s, m.position_time_s, m.position_mm)
+        counted = m.counted()
         for ramp in several:
             inside = (m.force_time_s >= ramp.begin_s) & (m.force_time_s <= ramp.end_s) & (depth > 0)
-            inside &= m.force_time_s <= m.fit_to_s
+            inside &= counted
             if inside.any():
                 pieces.append((m.force_time_s[inside], depth[inside] / data.depth_mm, m.force_N[inside] / data.force_N))
     count = sum(len(t) for t, _, _ in pieces)
@@ -158,7 +206,7 @@ def _samples(data: Data, structure: Structure, ramps: list[list[Ramp]], which: s
     if count < need:
         kind = "rising ramp" if which == "all" else "rising ramp that begins out of contact on a recovered pad"
         found = f"only {count} force samples lie on one" if pieces else "there is none in the data"
-        raise InputError("--method fast", f"it needs {need} samples of a {kind}: {found}", OTHER)
+        raise InputError("--method fast", f"it needs {need} samples of a {kind}: {found}", WOULD_DO + OTHER)
     u = np.concatenate([p[1] for p in pieces])
     return _Phase(u, np.concatenate([p[2] for p in pieces]), [(t, depth) for t, depth, _ in pieces])
 
@@ -200,9 +248,9 @@ def _instrumental(data: Data, structure: Structure, v: Array) -> Array:
     return v
 
 
-def _loss(structure: Structure, gamma: Array, phase: _Phase, filter: Filter, T: float) -> float:
-    """Share of F^e lost at a ramp's end, the worst of the ramps: Σ ΔF^e (1 − g(t_end − t)) / F^e(end)."""
-    worst = 0.0
+def _losses(structure: Structure, gamma: Array, phase: _Phase, filter: Filter, T: float) -> list[float]:
+    """Share of F^e lost at the end of each ramp: Σ ΔF^e (1 − g(t_end − t)) / F^e(end)."""
+    out = []
     for t, u in phase.pieces:
         s, _ = structure.family.shape(u, gamma[1:])
         rise = np.diff(s, prepend=0.0)
@@ -210,9 +258,13 @@ def _loss(structure: Structure, gamma: Array, phase: _Phase, filter: Filter, T: 
         middle = ago + np.append(np.diff(t), 0.0)[: len(t)] / 2
         g = filter.step_response(int(np.ceil(middle.max() / T)) + 2)
         lost = 1 - np.interp(middle / T, np.arange(len(g)), g)
-        if s[-1] > 0:
-            worst = max(worst, float(rise @ lost / s[-1]))
-    return worst
+        out.append(max(float(rise @ lost / s[-1]), 0.0) if s[-1] > 0 else 0.0)
+    return out
+
+
+def _runs_away(structure: Structure) -> InputError:
+    return InputError("fit", f"the ARX filter of order {structure.order} grows without end within these data",
+                      "Try another order, or a longer --sample-time.")  # fmt: skip
 
 
 def _bias(data: Data, structure: Structure, every: list[list[Ramp]], rested: list[list[Ramp]]) -> float:

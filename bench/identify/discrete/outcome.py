@@ -16,6 +16,7 @@ from sim.transfer import NotARelaxation, relaxation_of
 from .._kernel import Array
 from ..held_out import FOLDS, folds_of
 from ..noise import noise_of
+from ..notes import about_data
 from ..parameters import DOUBTFUL
 from ..problem import Problem, Run
 from ..result import Evidence, FitResult, Parameter, Trace
@@ -93,7 +94,8 @@ def _result(estimator: Estimator, data: Data, best: Candidate, candidates: list[
     V = found.V * unit
     noise = noise_of(data.on_grid())
     reading = _Reading(estimator, data, structure, found)
-    notes = [*data.notes, f"Sampled every {data.T:.6g} s.", *reading.notes, *found.notes]
+    about = about_data(data.checked, noise_of(data.checked.measurements), structure.unilateral, pasts=False)
+    notes = [*about, *data.notes, f"Sampled every {data.T:.6g} s.", *reading.notes, *found.notes]
     filter = structure.filter(found.v)
     history: dict[str, list[float]] = {"V": [V_n * unit for V_n, _ in found.history]}
     for _, v in found.history:

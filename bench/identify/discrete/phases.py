@@ -11,10 +11,12 @@ from bench.recording.types import Measurement
 from .._kernel import Array
 from ..motion import holds
 
-REST = 10.0
-"""A pad counts as recovered after a rest this many times as long as all the contact before it.
+MEMORY = 0.035
+"""A pad counts as recovered where what is left of its earlier creep is no more than this share of the ramp's own force.
 
-A mode of rate ν that crept for x/ν then keeps (1 − e^−x) e^−10x of its creep: 3.5 % at the most, whatever ν is.
+A mode of rate ν that crept for a time C, and then had R to come back, keeps (1 − e^−νC) e^−νR of the force that pressed
+it: with k = R/C at the most (k/(k+1))^k/(k+1), whatever ν is. That is 3.5 % after a rest ten times as long as all the
+contact before it, and at any time after a touch-off with a hundredth of the ramp's force.
 """
 TOUCH = 0.005  # of the greatest depth: deeper is contact
 
@@ -41,24 +43,31 @@ def ramps_of(m: Measurement) -> list[Ramp]:
     t, x = m.position_time_s, m.position_mm
     depth = max(float(x.max()), 0.0)
     contact = np.concatenate([[0.0], np.cumsum(np.diff(t) * (x[1:] > TOUCH * depth))])
+    pressed = np.abs(m.force_N) * (np.interp(m.force_time_s, t, x) > TOUCH * depth)
     out = []
     for begin, end in spans:
         start_mm, end_mm = np.interp([begin, end], t, x)
         if abs(end_mm - start_mm) < 0.01 * max(float(np.ptp(x)), 1e-12):
             continue
         i = int(np.searchsorted(t, begin, side="right")) - 1
-        loaded = float(contact[max(i, 0)])
-        out.append(Ramp(begin, end, float(start_mm), float(end_mm), _rested(t, x, max(i, 0), loaded, TOUCH * depth)))
+        before, after = np.searchsorted(m.force_time_s, [begin, end])
+        past, own = (
+            float(part.max()) if len(part) else 0.0 for part in (pressed[:before], pressed[before : after + 1])
+        )
+        left = _left(t, x, max(i, 0), float(contact[max(i, 0)]), TOUCH * depth)
+        out.append(Ramp(begin, end, float(start_mm), float(end_mm), left * past <= MEMORY * own))
     return out
 
 
-def _rested(t: Array, x: Array, i: int, loaded_s: float, touch_mm: float) -> bool:
+def _left(t: Array, x: Array, i: int, loaded_s: float, touch_mm: float) -> float:
+    """The most that can be left of earlier creep at sample i, as a share; infinite in contact."""
     if x[i] > touch_mm:
-        return False
+        return float("inf")
     if loaded_s == 0.0:
-        return True
+        return 0.0
     last = int(np.flatnonzero(x[: i + 1] > touch_mm)[-1])
-    return bool(t[i] - t[last] >= REST * loaded_s)
+    k = float(t[i] - t[last]) / loaded_s
+    return float((k / (k + 1)) ** k / (k + 1))
 
 
 def _marked(m: Measurement) -> list[tuple[float, float]]:

@@ -9,7 +9,7 @@ linear filter behind it, so what is averaged still obeys the model.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,8 @@ class Data:
     force_N: float
     measurements: tuple[Measurement, ...]
     """As measured."""
+    checked: problem.Problem
+    """The same as the other methods have it."""
     notes: tuple[str, ...] = field(default=())
 
     @property
@@ -87,10 +89,16 @@ class Data:
         for m, run in zip(self.measurements, self.runs, strict=True):
             keep = run.has
             t, F = run.time_s[keep], run.y[keep] * self.force_N
-            out.append(
-                Measurement(m.name, t, run.depth_mm[keep], t, F, m.fit_from_s, m.fit_to_s, m.marks, m.surface_std_mm)
-            )
+            out.append(replace(m, position_time_s=t, position_mm=run.depth_mm[keep], force_time_s=t, force_N=F))
         return out
+
+    def moved(self, j: int, by_mm: float) -> Data:
+        """The same with the surface of run `j` so much higher: every depth of it is that much greater."""
+        u, m = self.runs[j], self.measurements[j]
+        run = replace(u, u=u.u + by_mm / self.depth_mm, depth_mm=u.depth_mm + by_mm, _kept={})
+        runs = (*self.runs[:j], run, *self.runs[j + 1 :])
+        measured = replace(m, position_mm=m.position_mm + by_mm)
+        return replace(self, runs=runs, measurements=(*self.measurements[:j], measured, *self.measurements[j + 1 :]))
 
 
 def sampled(measurements: Sequence[Measurement], T: float | None = None) -> Data:
@@ -111,11 +119,11 @@ def sampled(measurements: Sequence[Measurement], T: float | None = None) -> Data
     left = sum(float(run.weight.sum()) for run in runs)
     if left < FEWEST:
         raise InputError("--sample-time", f"{T:g} s leaves {left:.0f} samples to fit", f"At least {FEWEST} are needed.")
-    notes = list(checked.notes)
+    notes = []
     empty = sum(int((~run.has).sum()) for run in runs)
     if empty:
         notes.append(f"{empty} samples of the grid have no measured force (gaps) and do not count.")
-    return Data(runs, T, checked.depth_mm, checked.force_N, checked.measurements, tuple(notes))
+    return Data(runs, T, checked.depth_mm, checked.force_N, checked.measurements, checked, tuple(notes))
 
 
 def own_time(measurements: Sequence[Measurement]) -> float:
@@ -150,8 +158,7 @@ def _series(m: Measurement, T: float, depth_mm: float, force_N: float) -> Series
     here = np.bincount(owner, minlength=K)
     has = here > 0
     empty = np.flatnonzero(~has)
-    counted = (m.force_time_s >= m.fit_from_s) & (m.force_time_s <= m.fit_to_s)
-    weight = (has & (np.bincount(owner, counted, K) == here)).astype(float)
+    weight = (has & (np.bincount(owner, m.counted(), K) == here)).astype(float)
     y = np.zeros(K)
     y[has] = (np.bincount(owner, m.force_N / force_N, K) / np.maximum(here, 1))[has]
     nodes = np.concatenate([m.force_time_s, time[empty]])

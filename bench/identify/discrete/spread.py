@@ -19,6 +19,9 @@ def covariance(data: Data, structure: Structure, estimator: Estimator, found: Fo
 
     S is summed over windows as long as the simulated residual remembers (Bartlett's kernel). What a scheme gets wrong
     by construction (ARX under output noise) is in no standard error. γ from data of its own (`fast`) is carried on.
+
+    A surface that touch-off left in doubt adds (dv/ds)(dv/ds)ᵀ of its own variance: the schemes take it as certain,
+    and their numbers move with it.
     """
     scores = estimator.scores(data, structure, found.v)
     S = _windowed(scores, memory(data, structure, found.v))
@@ -26,7 +29,7 @@ def covariance(data: Data, structure: Structure, estimator: Estimator, found: Fo
     g = structure.nonlinear
     if found.gamma_covariance is None:
         inverse = _inverse(M)
-        return inverse @ S @ inverse.T
+        return inverse @ S @ inverse.T + _by_surface(data, structure, estimator, found, inverse)
     inverse = _inverse(M[g:, g:])
     by_gamma = -inverse @ M[g:, :g]
     out = np.zeros_like(S)
@@ -34,7 +37,34 @@ def covariance(data: Data, structure: Structure, estimator: Estimator, found: Fo
     out[g:, :g] = by_gamma @ found.gamma_covariance
     out[:g, g:] = out[g:, :g].T
     out[g:, g:] = inverse @ S[g:, g:] @ inverse.T + by_gamma @ found.gamma_covariance @ by_gamma.T
+    return out + _by_surface(data, structure, estimator, found, None)
+
+
+def _by_surface(data: Data, structure: Structure, estimator: Estimator, found: Found, inverse: Array | None) -> Array:
+    """What the doubtful surfaces add to the covariance of v.
+
+    `inverse`: of the slope M, as the numbers then move by −M⁻¹ ∂(sums)/∂s; None: the scheme is run again, for one whose
+    numbers are no zero of its sums (`fast`).
+    """
+    out = np.zeros((structure.size,) * 2)
+    for j, m in enumerate(data.measurements):
+        h = m.surface_std_mm
+        if not h > 0:
+            continue
+        ends = [_moved(data.moved(j, sign * h), structure, estimator, found, inverse) for sign in (1, -1)]
+        shift = (ends[0] - ends[1]) / 2  # of one standard deviation
+        out += np.outer(shift, shift)
     return out
+
+
+def _moved(data: Data, structure: Structure, estimator: Estimator, found: Found, inverse: Array | None) -> Array:
+    if inverse is None:
+        return estimator.estimate(data, structure, quick=True, start=found.v).v
+    return -inverse @ _sums(data, structure, estimator, found.v)
+
+
+def _sums(data: Data, structure: Structure, estimator: Estimator, v: Array) -> Array:
+    return sum((s.sum(axis=0) for s in estimator.scores(data, structure, v)), np.zeros(structure.size))
 
 
 def memory(data: Data, structure: Structure, v: Array) -> int:
@@ -83,7 +113,7 @@ def _slope(data: Data, structure: Structure, estimator: Estimator, v: Array) -> 
         for sign in (1, -1):
             near = v.copy()
             near[j] += sign * h
-            sums.append(sum((s.sum(axis=0) for s in estimator.scores(data, structure, near)), np.zeros(P)))
+            sums.append(_sums(data, structure, estimator, near))
         out[:, j] = (sums[0] - sums[1]) / (2 * h)
     return out
 

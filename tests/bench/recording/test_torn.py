@@ -74,7 +74,8 @@ def check(path: Path, expected: list[float], *, damaged: bool = True) -> None:
     assert np.array_equal(again.motor.position_mm, recording.motor.position_mm)
     assert np.array_equal(again.load_cell.gross_N, recording.load_cell.gross_N)
     assert again.run == recording.run and again.attachments == recording.attachments
-    assert bool(again.lost) == report.lost == (report.status == 3)
+    assert report.lost == bool(recording.lost) == (report.status == 3)
+    assert bool(again.lost) == report.gone
 
 
 def test_cut_anywhere(whole, tmp_path):

@@ -62,7 +62,7 @@ def test_too_much_force_in_mid_motion(tmp_path, base):
     speed = np.abs(np.diff(motor.command_mm) / np.diff(motor.time_s))[motor.time_s[1:] <= stop].max()
     lag_s = 0.002 if base == "simulated" else 0.02
     way_mm = speed * (done.plan.force_latency_s + lag_s) + speed**2 / (2 * limits.acceleration)
-    deepest = done.world.plant.position_mm if base == "simulated_iai" else motor.position_mm.max()
+    deepest = float(done.world.plant.history(stop - 0.2)[1].max())
     beyond = float(law.stiffness(deepest - done.world.surface_mm)) * way_mm + 5 * NOISE_N
     assert done.recording.load_cell.force_N.max() < 2 + beyond
     assert done.recording.load_cell.force_N.max() > 2
@@ -113,7 +113,7 @@ def test_contact_where_there_should_be_air(tmp_path, base, surface):
 def test_no_pad_where_one_should_be(tmp_path, base):
     done = run(tmp_path, DEEP, base, simulation={"surface": 5}, limits={"position": [-2, 2]})
     stopped_well(done, r"^no contact: the probe went from -0\.30 to 2\.00 mm and felt less than 0\.05\d? N")
-    assert done.recording.motor.position_mm.max() < 2.002
+    assert done.recording.motor.position_mm.max() < 2.005
 
 
 @BOTH

@@ -1,0 +1,33 @@
+"""`padbench status BENCH`: who is there, where it stands, how its lines do; moves and energises nothing."""
+
+from __future__ import annotations
+
+import argparse
+
+from bench.daily.words import add_arguments, bench_of, put_out
+from bench.errors import EXIT_DONE, EXIT_NO
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    add_arguments(parser, moves=False)
+
+
+def main(args: argparse.Namespace) -> int:
+    """Print what was seen; status 0 where all is well, 1 where somebody must see to something."""
+    bench = bench_of(args)
+    from bench.daily import look
+    from bench.daily.open_bench import OpenBench
+
+    with OpenBench(bench) as work:
+        found = look.status(work)
+    figures = {
+        "bench": bench.name,
+        "motor": found.motor,
+        "load_cell": found.load_cell,
+        "lines": found.lines,
+        "problems": found.problems,
+        "remarks": found.remarks,
+    }
+    put_out(args, look.words(found), figures)
+    return EXIT_NO if found.problems else EXIT_DONE
