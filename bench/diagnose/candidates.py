@@ -122,14 +122,13 @@ class Signatures:
     def __init__(self, data: Data, fit: Fit) -> None:
         self.data, self.fit = data, fit
         self.force = force_at(data, fit.structure, fit.x)
-        self.scale = np.sqrt(data.weight) / data.sigma_N
         J = jacobian(data, fit.structure, fit.x, self.force)
         self.jacobian = J[:, : len(fit.x) - fit.structure.tail]
         norm = np.linalg.norm(J, axis=0)
         J = J[:, norm > 1e-9 * max(float(norm.max(initial=0.0)), 1e-300)]
         Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
         self.Q = [np.ascontiguousarray(q) for q in Q.T]
-        self.residual = self._clear(self.scale * (data.force_N - self.force))
+        self.residual = self._clear(data.whitened(data.force_N - self.force))
 
     def _clear(self, column: Array) -> Array:
         for q in self.Q:
@@ -146,7 +145,7 @@ class Signatures:
         structure = self.fit.structure.with_cause(cause.with_start(**{amplitude.name: size}))
         added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
         x = _with(self.fit, added)
-        column = self._clear(self.scale * (force_at(self.data, structure, x) - self.force) / size)
+        column = self._clear(self.data.whitened(force_at(self.data, structure, x) - self.force) / size)
         square = float(np.sum(column * column))
         if not np.isfinite(square) or square <= 1e-18:
             return 0.0, 0.0

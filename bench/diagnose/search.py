@@ -277,7 +277,7 @@ class Search:
         """Whether the step from one fit to the next is more than chance, and more than a crumb."""
         short = self.short
         change = force_at(short, after.structure, after.x) - force_at(short, before.structure, before.x)
-        direction = (np.sqrt(short.weight > 0) * change / short.sigma_N)[self.prepared.owner]
+        direction = self.prepared.full.whitened(change[self.prepared.owner])
         inflation = self.prepared.colour.inflation(direction)
         return evidence_of(before, after, base, inflation, self.samples)
 
