@@ -14,13 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.identify.motion import jitter
-from bench.motion_between import motion_between
+from bench.motion_between import Moves, motion_between, planned_moves
 from sim.jit import compiled
 
 Array = NDArray[np.float64]
 
 REACHES = np.array([2, 3, 4, 6, 8, 11, 15, 21, 29, 40, 56, 80, 112, 160], dtype=np.int64)
 """Half-widths of the windows, in samples."""
+SHORTEST, EDGE = 30, 4  # samples of a hold that can show it to be at rest; samples at its ends that may still move
+BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
+TOGETHER = 20  # samples that share the error of a window, about
 WIDTH = 2.2  # standard deviations on either side of a value
 
 
@@ -119,17 +122,73 @@ def smoothed(time_s: Array, position_mm: Array) -> tuple[Array, Array]:
 @dataclass(frozen=True)
 class Felt:
     """The motion as the pad felt it: `time_s`, `position_mm` (k,) with nodes between samples where they matter;
-    `std_mm` (k,): what is left of the noise; `noise_mm`: what it was."""
+    `std_mm` (k,): what is left of the noise; `noise_mm`: what it was. `stretch` (k,): nodes of one number share most of
+    the error that is left."""
 
     time_s: Array
     position_mm: Array
     std_mm: Array
     noise_mm: float
+    stretch: NDArray[np.intp]
+
+
+def _coarse(position_mm: Array) -> float:
+    """What no averaging takes away, mm: the error of a scale whose steps the noise does not blur."""
+    step = resolution(position_mm)
+    return step / np.sqrt(12.0) if jitter(position_mm) < BLURRED * step else 0.0
+
+
+def _rested(
+    position_mm: Array, clean_mm: Array, std_mm: Array, noise_mm: float, left_mm: float
+) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Positions (n,), their standard deviations (n,), with one value for each hold whose samples are that of one; and
+    the number of the hold, from 1 on; 0: none."""
+    clean, std = clean_mm.copy(), std_mm.copy()
+    hold = np.zeros(len(clean), dtype=np.intp)
+    coarse, reached = _coarse(position_mm) > 0.0, dict[float, int]()
+    still = np.abs(np.diff(clean_mm)) <= max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8))).reshape(-1, 2)
+    for number, (a, b) in enumerate(edges.tolist(), 1):
+        inside = position_mm[a + EDGE : b + 1 - EDGE]
+        n = len(inside)
+        if n < SHORTEST:
+            continue
+        level = float(inside.mean())
+        halves = abs(float(inside[: n // 2].mean() - inside[n // 2 :].mean())) / (2.0 * noise_mm / np.sqrt(n))
+        if float(np.sum((inside - level) ** 2)) <= noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n)) and halves < 4.0:
+            clean[a : b + 1] = level
+            std[a : b + 1] = noise_mm / np.sqrt(n)
+            # a coarse scale is off by as much whenever the same level is held
+            again = reached.setdefault(float(np.median(inside)), number) if coarse else number
+            hold[a : b + 1] = again
+    return clean, std, hold
 
 
 def felt(time_s: Array, position_mm: Array) -> Felt:
-    """Smoothed positions, and the motion between them rebuilt (`bench.motion_between`)."""
+    """Smoothed positions, and the motion between them rebuilt (`bench.motion_between`).
+
+    A move that is a planner's trapezoid, as far as its noisy samples tell, becomes that trapezoid: a moving mass and a
+    lag feel accelerations and corners that no smoothing keeps.
+    """
     clean, std = smoothed(time_s, position_mm)
     left = float(np.median(std)) if len(std) else 0.0
-    time, position = motion_between(time_s, clean, noise_mm=left)
-    return Felt(time, position, np.asarray(np.interp(time, time_s, std)), position_noise(position_mm))
+    noise = position_noise(position_mm)
+    planned: Moves = {}
+    stretch = -1 - np.arange(len(clean)) // TOGETHER
+    if 0.0 < left < noise:
+        clean, std, hold = _rested(position_mm, clean, std, noise, left)
+        stretch = np.where(hold > 0, hold, stretch)
+        planned = planned_moves(time_s, position_mm, clean, noise, left)
+        for (first, last), move in planned.items():
+            inside = slice(first, last + 1)
+            clean[inside] = move.position(time_s[inside])
+            at_ends = max(float(std[first]), float(std[last]), 0.7 * _coarse(position_mm))
+            std[inside] = max(2.0 * noise / np.sqrt(last - first + 1), at_ends)
+            stretch[inside] = 1 + len(clean) + first
+        # a coarse scale's error averages out over levels that are passed, not over readings of one
+        std = np.where(
+            np.abs(np.gradient(clean)) < 2.0 * resolution(position_mm), np.maximum(std, _coarse(position_mm)), std
+        )
+    time, position = motion_between(time_s, clean, noise_mm=left, planned=planned)
+    before = np.clip(np.searchsorted(time_s, time, side="right") - 1, 0, len(clean) - 1)
+    return Felt(time, position, np.asarray(np.interp(time, time_s, std)), noise, stretch[before])

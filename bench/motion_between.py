@@ -28,27 +28,34 @@ INSIDE = 16  # samples of a move that are looked at
 SCAN = np.geomspace(100.0, 1e6, 25)  # of accelerations, in reaches/s²
 GENTLE = 0.01  # what a doubled acceleration costs, in squares of the slack and a move
 SLACK = 1e-3  # of the way: what a trapezoid may miss a sample by
+LEAST = 3  # samples of a move that can show it to be a trapezoid
+AGREED = 5.0  # standard deviations of χ² within which it is one
 
 
 def motion_between(
-    time_s: Array, position_mm: Array, reach_mm: float | None = None, noise_mm: float = 0.0
+    time_s: Array,
+    position_mm: Array,
+    reach_mm: float | None = None,
+    noise_mm: float = 0.0,
+    planned: Moves | None = None,
 ) -> tuple[Array, Array]:
     """Samples with more nodes between them where they matter; the very same arrays where none does.
 
     `time_s`, `position_mm`: shape (n,), times rising. `reach_mm`: the depth that the precision is measured by, by
     default the range of the positions. `noise_mm`: standard deviation of the position's noise; steps within it are no
-    motion. Returns times and positions, shape (n + k,), with every sample of the input among them.
+    motion. `planned`: moves that are known to be trapezoids (`planned_moves`), which the positions follow already.
+    Returns times and positions, shape (n + k,), with every sample of the input among them.
     """
     reach = float(np.ptp(position_mm)) if reach_mm is None else reach_mm
     if len(time_s) < 5 or not reach > 0:
         return time_s, position_mm
-    steps = np.abs(np.diff(position_mm))
-    moving = steps > max(6 * noise_mm, 1e-5 * reach)
-    needed = moving & (steps > max(STEP / 2 * reach, 12 * noise_mm))
-    if not needed.any():
+    moving, groups = _moving(position_mm, reach, noise_mm)
+    known = planned or {}
+    groups = [g for g in groups if not any(g[0] < k[1] and k[0] < g[1] for k in known)]
+    if not groups and not known:
         return time_s, position_mm
-    groups = _grouped(moving, needed)
-    trapezoids = _trapezoids(time_s, position_mm, moving, groups, reach, noise_mm)
+    trapezoids = known | _trapezoids(time_s, position_mm, moving, groups, reach, noise_mm)
+    groups = sorted([*groups, *known])
     cut = [_cut(time_s, position_mm, *group, trapezoids.get(group), reach, noise_mm) for group in groups]
     times = np.concatenate([t for t, _ in cut])
     if not len(times):
@@ -56,6 +63,43 @@ def motion_between(
     place = np.searchsorted(time_s, times)
     values = np.concatenate([x for _, x in cut])
     return np.insert(time_s, place, times), np.insert(position_mm, place, values)
+
+
+Moves = dict[tuple[int, int], "Trapezoid"]
+"""By (sample before, sample after)."""
+
+
+def planned_moves(time_s: Array, position_mm: Array, clean_mm: Array, noise_mm: float, left_mm: float) -> Moves:
+    """Moves whose noisy positions (n,) are those of a trapezoid and nothing else, within the noise of the samples.
+
+    `clean_mm` (n,): the same positions smoothed, with noise `left_mm`: they tell where moves begin and end.
+    """
+    reach = float(np.ptp(clean_mm))
+    if len(time_s) < 5 or not reach > 0:
+        return {}
+    moving, _ = _moving(clean_mm, reach, left_mm)
+    groups = [(a, b) for a, b in _grouped(moving, moving) if b - a >= LEAST]
+    if not groups:
+        return {}
+    found = _trapezoids(time_s, clean_mm, moving, groups, reach, noise_mm, position_mm)
+    out = {}
+    for (first, last), move in found.items():
+        corners = move.corners_s()  # slow beginnings and ends hide in the noise
+        a = min(first, max(int(np.searchsorted(time_s, corners[0])) - 1, 0))
+        b = max(last, min(int(np.searchsorted(time_s, corners[-1])) + 1, len(time_s) - 1))
+        off = (position_mm - move.position(time_s))[a : b + 1] / noise_mm
+        n = len(off)
+        if n >= LEAST and float(np.sum(off**2)) <= 1.2 * n + AGREED * np.sqrt(2.0 * n):
+            out[a, b] = move
+    return out
+
+
+def _moving(position_mm: Array, reach: float, noise_mm: float) -> tuple[NDArray[np.bool_], list[tuple[int, int]]]:
+    """(which intervals are motion, stretches of them that want nodes)."""
+    steps = np.abs(np.diff(position_mm))
+    moving = steps > max(6 * noise_mm, 1e-5 * reach)
+    needed = moving & (steps > max(STEP / 2 * reach, 12 * noise_mm))
+    return moving, _grouped(moving, needed)
 
 
 def _grouped(moving: NDArray[np.bool_], needed: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -118,14 +162,20 @@ class _Moves:
 
 
 def _trapezoids(
-    t: Array, x: Array, moving: NDArray[np.bool_], groups: list[tuple[int, int]], reach: float, noise: float
-) -> dict[tuple[int, int], Trapezoid]:
-    """The groups that are trapezoids, within what the samples tell."""
+    t: Array,
+    x: Array,
+    moving: NDArray[np.bool_],
+    groups: list[tuple[int, int]],
+    reach: float,
+    noise: float,
+    fitted: Array | None = None,
+) -> Moves:
+    """The groups that are trapezoids, within what the samples tell; `fitted`: samples to fit instead of x."""
     rest = [g for g in groups if _from_rest(moving, x, g)]
     if not rest:
         return {}
     starts, ends = _levels(x, moving, rest)
-    moves = _moves(t, x, rest, starts, ends)
+    moves = _moves(t, x, rest, starts, ends, x if fitted is None else fitted)
     allowed = np.maximum(4 * noise, SLACK * moves.way)
     told = moves.count >= 2
     if not told.any():
@@ -196,7 +246,7 @@ def _levels(x: Array, moving: NDArray[np.bool_], groups: list[tuple[int, int]]) 
     return start, end
 
 
-def _moves(t: Array, x: Array, groups: list[tuple[int, int]], starts: Array, ends: Array) -> _Moves:
+def _moves(t: Array, x: Array, groups: list[tuple[int, int]], starts: Array, ends: Array, fitted: Array) -> _Moves:
     picked = []
     for first, last in groups:
         inside = np.arange(first + 1, last)
@@ -211,7 +261,7 @@ def _moves(t: Array, x: Array, groups: list[tuple[int, int]], starts: Array, end
     for k, ((first, last), p) in enumerate(zip(groups, picked, strict=True)):
         sign = 1.0 if ends[k] > starts[k] else -1.0
         time[k], used[k, : len(p)] = t[first], 1.0
-        time[k, : len(p)], gone[k, : len(p)] = t[p], sign * (x[p] - starts[k])
+        time[k, : len(p)], gone[k, : len(p)] = t[p], sign * (fitted[p] - starts[k])
         along = sign * (x[first : last + 1] - starts[k])
         middle[k] = np.interp(way[k] / 2, along, t[first : last + 1])
         speed[k] = np.max(np.diff(along) / np.diff(t[first : last + 1]))
@@ -302,11 +352,15 @@ def _cut(
     pieces = np.ceil(np.maximum(steps / (STEP * reach), np.sqrt(bend / (BEND * reach))))
     pieces = np.clip(pieces, 1, WIDEST).astype(np.intp)
     new = [time[k] + h[k] * np.arange(1, n) / n for k, n in enumerate(pieces) if n > 1]
-    fresh = np.unique(np.concatenate([*new, corners])) if new or len(corners) else np.zeros(0)
+    if len(corners):  # where the acceleration jumped, the next sample wants some nodes of the new one alone
+        following = time[np.clip(np.searchsorted(time, corners, side="right"), 0, len(time) - 1)]
+        new += [corners, corners + (following - corners) / 3, corners + (following - corners) * 2 / 3]
+    fresh = np.unique(np.concatenate(new)) if new else np.zeros(0)
     # A node on a sample says nothing, and a sliver of a step costs digits.
     at = np.clip(np.searchsorted(time, fresh, side="right") - 1, 0, len(h) - 1)
     away = np.minimum(fresh - time[at], time[at + 1] - fresh)
     fresh = fresh[away > 1e-3 * h[at]]
+    fresh = fresh[np.diff(fresh, prepend=-np.inf) > 1e-3 * float(h.min())]
     miss = x[first : last + 1] - position(time)
     return fresh, np.asarray(position(fresh) + np.interp(fresh, time, miss))
 

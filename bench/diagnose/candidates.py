@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from bench.identify.motion import holds
 from sim.effects import all_effects
 from sim.effects.base import Effect, Form, Parameter
 from sim.elastic import NoPad
@@ -30,6 +31,8 @@ PERIODS = 16
 SHORTEST = 0.12  # of the longest period
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
+LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
+LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich
 LONGEST_REPORTED = 0.6  # of the travel, for errors of the position: longer ones are another elastic law
 
 
@@ -50,11 +53,15 @@ class Reach:
     travel_mm: float
     depth_mm: float
     force_N: float
+    rich: bool = True
+    """Whether depths are held, or passed again: what depends on the position alone differs there from a law, which
+    relaxes. In one pass over the depth it is told only by many periods."""
 
 
 def narrowed(form: Form, reach: Reach) -> Form:
     """The form with its parameters kept within what the data can tell of, and started there."""
     longest = LONGEST_REPORTED if "report" in form.blocks else LONGEST_PERIOD
+    longest = longest if reach.rich else LONGEST_IN_PASSING
     return replace(form, parameters=tuple(_narrowed(p, reach, longest) for p in form.parameters))
 
 
@@ -80,6 +87,31 @@ def _narrowed(p: Parameter, reach: Reach, longest: float) -> Parameter:
     default = min(max(default, lower), upper)
     typical = min(max(p.typical, lower), upper)
     return replace(p, lower=lower, upper=upper, starts=starts, default=default, typical=typical)
+
+
+def is_rich(data: Data) -> bool:
+    """Whether a measurement holds several depths, or passes over its depth several times."""
+    counted = data.weight > 0
+    x = data.position_mm
+    span = float(np.ptp(x[counted])) if counted.any() else 0.0
+    if span <= 0.0:
+        return False
+    levels: list[float] = []
+    for s in holds(data.time_s, x):
+        level = float(np.mean(x[s]))
+        if level > 0.05 * span and all(abs(level - other) > 0.05 * span for other in levels):
+            levels.append(level)
+    if len(levels) >= LEVELS:
+        return True
+    passes, way, end = 0, 0, float(x[0])
+    for value in x[:: max(len(x) // 5000, 1)].tolist():
+        if way >= 0 and value > end or way <= 0 and value < end:
+            if way == 0 and abs(value - end) > 0.5 * span:
+                way, passes = (1 if value > end else -1), passes + 1
+            end = value if way else end
+        elif abs(value - end) > 0.5 * span:
+            way, passes, end = -way, passes + 1, value
+    return passes >= PASSES
 
 
 def forms(structure: Structure, in_air: bool, reach: Reach) -> list[tuple[Effect, Form]]:
@@ -122,14 +154,13 @@ class Signatures:
     def __init__(self, data: Data, fit: Fit) -> None:
         self.data, self.fit = data, fit
         self.force = force_at(data, fit.structure, fit.x)
-        self.scale = np.sqrt(data.weight) / data.sigma_N
         J = jacobian(data, fit.structure, fit.x, self.force)
         self.jacobian = J[:, : len(fit.x) - fit.structure.tail]
         norm = np.linalg.norm(J, axis=0)
         J = J[:, norm > 1e-9 * max(float(norm.max(initial=0.0)), 1e-300)]
         Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
         self.Q = [np.ascontiguousarray(q) for q in Q.T]
-        self.residual = self._clear(self.scale * (data.force_N - self.force))
+        self.residual = self._clear(data.whitened(data.force_N - self.force))
 
     def _clear(self, column: Array) -> Array:
         for q in self.Q:
@@ -146,7 +177,7 @@ class Signatures:
         structure = self.fit.structure.with_cause(cause.with_start(**{amplitude.name: size}))
         added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
         x = _with(self.fit, added)
-        column = self._clear(self.scale * (force_at(self.data, structure, x) - self.force) / size)
+        column = self._clear(self.data.whitened(force_at(self.data, structure, x) - self.force) / size)
         square = float(np.sum(column * column))
         if not np.isfinite(square) or square <= 1e-18:
             return 0.0, 0.0

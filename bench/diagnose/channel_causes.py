@@ -32,7 +32,7 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
     out = []
     if prepared.hum is not None:
         hum = prepared.hum.force_N((prepared.full.time_s - prepared.full.time_s[0])[at][counted])
-        id_, form, numbers = described(final, len(final.structure.causes) - 1, prepared.colour.memory**0.5)
+        id_, form, numbers = described(final, len(final.structure.causes) - 1)
         out.append(_named(id_, form, numbers, float(np.sum(hum**2)) / n))
     masks = {"saturation": flags.saturated, "stuck_samples": flags.stuck, "outliers": flags.outlier}
     for id_, mask in masks.items():

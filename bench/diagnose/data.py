@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ Mask = NDArray[np.bool_]
 BLOCKS, FOLDS = 20, 5
 FEWEST = 20  # force samples
 SHORT = 1500  # samples that need no stand-in
+LEAST_SHARED = 1e-2  # of the noise's own square: what is shared and less changes nothing
 TARGET = 4000  # samples of the stand-in, where its blocks can be that long
 
 
@@ -35,8 +37,12 @@ class Data:
     force_N: Array
     weight: Array
     sigma_N: Array
-    """Standard deviation of one force sample there."""
+    """Standard deviation of one force sample there, by itself."""
     fold: NDArray[np.intp]
+    shared_N: Array | None = None
+    """Standard deviation of what errors of the position make beside it, the same for all of a stretch."""
+    stretch: NDArray[np.intp] | None = None
+    """Number of the hold, the move or the window, from 0 on."""
     tared: Mask | None = None
     """Entries at which the force was taken for zero (the tare); None: the force's zero is its own."""
 
@@ -44,6 +50,36 @@ class Data:
     def size(self) -> int:
         """Entries of the grid."""
         return len(self.time_s)
+
+    @property
+    def total_N(self) -> Array:
+        """Standard deviation of one force sample, all in all (n,)."""
+        return self.sigma_N if self.shared_N is None else np.asarray(np.hypot(self.sigma_N, self.shared_N))
+
+    @cached_property
+    def scale(self) -> Array:
+        """√w/σ (n,)."""
+        return np.asarray(np.sqrt(self.weight) / self.sigma_N)
+
+    @cached_property
+    def _modes(self) -> tuple[NDArray[np.intp], Array, Array] | None:
+        """(stretch, u (n,), factor · u (n,)): in each stretch (1 + u uᵀ)^−½ = 1 − factor u uᵀ; None: nothing to do."""
+        if self.shared_N is None or self.stretch is None:
+            return None
+        u = self.scale * self.shared_N
+        squares = np.bincount(self.stretch, u * u)
+        if not (squares > LEAST_SHARED).any():
+            return None
+        factors = (1.0 - 1.0 / np.sqrt(1.0 + squares)) / np.maximum(squares, 1e-300)
+        return self.stretch, u, (np.where(squares > LEAST_SHARED, factors, 0.0))[self.stretch] * u
+
+    def whitened(self, force_N: Array) -> Array:
+        """Forces (n,) in units of noise that is independent from entry to entry: what a stretch shares counts once."""
+        e = self.scale * force_N
+        if self._modes is None:
+            return np.asarray(e)
+        stretch, u, factor = self._modes
+        return np.asarray(e - factor * np.bincount(stretch, u * e)[stretch])
 
     def without(self, fold: int) -> Data:
         """One fold's samples out of the cost."""
@@ -94,7 +130,17 @@ class Prepared:
     def floor_N(self) -> float:
         """RMS of an error with nothing left to explain."""
         w = self.full.weight
-        return float(np.sqrt(np.sum(w * self.full.sigma_N**2) / max(w.sum(), 1.0)))
+        return float(np.sqrt(np.sum(w * self.full.total_N**2) / max(w.sum(), 1.0)))
+
+    @property
+    def floor_square_std(self) -> float:
+        """Standard deviation of a mean square of the noise, N²: few stretches share few errors."""
+        full, n = self.full, max(float(self.full.weight.sum()), 1.0)
+        together = 0.0
+        if full.shared_N is not None and full.stretch is not None:
+            together = float(np.sum(np.bincount(full.stretch, full.weight * full.shared_N**2) ** 2))
+        own = self.colour.memory * float(np.sum(full.weight * full.sigma_N**4))
+        return float(np.sqrt(2.0 * (own + together))) / n
 
 
 def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
@@ -122,14 +168,21 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     stiffness = stiffness_along(m)
     through = stiffness * np.interp(m.force_time_s, motion.time_s, motion.std_mm)
     sigma, weight, force = np.full(len(grid), sigma_force), np.zeros(len(grid)), np.zeros(len(grid))
-    sigma[where] = np.sqrt(sigma_force**2 + through**2)
+    shared = np.zeros(len(grid))
+    stretch = motion.stretch[np.clip(np.searchsorted(motion.time_s, grid, side="right") - 1, 0, None)]
+    # a hold or a planned move is off as a whole; elsewhere windows of neighbours share what they share
+    whole = np.where(stretch[where] > 0, 1.0, np.sqrt(0.5))
+    shared[where] = whole * through
+    sigma[where] = np.hypot(sigma_force, np.sqrt(1.0 - whole**2) * through)
+    stretch = np.unique(stretch, return_inverse=True)[1]
     weight[where] = counted
     force[where] = m.force_N
     position = np.interp(grid, time, position)
     depth = max(float(position.max()), 1e-3)
     full = Data(
-        grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))), _tared(m, grid)
-    )
+        grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))), shared, stretch,
+        _tared(m, grid),
+    )  # fmt: skip
     owner = _blocks(
         full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(motion.std_mm, 0.9))
     )
@@ -239,7 +292,12 @@ def _averaged(full: Data, owner: NDArray[np.intp]) -> Data:
     time = np.bincount(owner, share * full.time_s) / shares
     position = np.bincount(owner, share * full.position_mm) / shares
     starts = np.flatnonzero(np.diff(owner, prepend=-1))
+    shared = None
+    if full.shared_N is not None:
+        shared = np.bincount(owner, share * full.shared_N) / shares
     tared = None if full.tared is None else full.tared[starts]
     return Data(
-        time, position, force, weight, sigma, full.fold[starts], tared if tared is not None and tared.any() else None
-    )
+        time, position, force, weight, sigma, full.fold[starts], shared,
+        None if full.stretch is None else full.stretch[starts],
+        tared if tared is not None and tared.any() else None,
+    )  # fmt: skip

@@ -17,12 +17,13 @@ from sim.pad import Pad
 
 from .channel import Faults, faults, not_of_the_motion, standing_off
 from .channel_causes import channel_causes, hum_cause
-from .data import Prepared, prepare
+from .data import Data, Prepared, prepare
 from .numbers import PadNumbers, Structure, cause_of
 from .refit import Fit, extended, force_at, mean_square, onto, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
 from .search import Path, Search
+from .spread import covariance
 from .verdict import EXPLAINED, chain, excesses, found, ordered
 from .write import model_of
 
@@ -88,11 +89,15 @@ def _whole(prepared: Prepared, fits: list[Fit]) -> tuple[Fit, Fit]:
     before = onto(fits[0], prepared.full, 6, 1e-8)
     last = fits[-1]
     if prepared.hum is None:
-        return before, onto(last, raw, 6, 1e-8)
+        return before, _spread(raw, onto(last, raw, 6, 1e-8))
     cause = hum_cause(prepared.hum)
     structure = last.structure.with_cause(cause)
     own = structure.x(last.x[: len(structure.pad.coordinates)], None)[structure.of_cause(len(structure.causes) - 1)]
-    return before, refit(raw, structure, extended(last, structure, own), 8, 1e-8)
+    return before, _spread(raw, refit(raw, structure, extended(last, structure, own), 8, 1e-8))
+
+
+def _spread(data: Data, fit: Fit) -> Fit:
+    return replace(fit, spread=covariance(data, fit)) if fit.structure.causes else fit
 
 
 def believed_structure(model: Model, prepared: Prepared) -> Structure:
@@ -188,7 +193,7 @@ def _concluded(
         force_N=raw.force_N[at],
         before_N=before[at],
         after_N=after[at],
-        sigma_N=full.sigma_N[at],
+        sigma_N=full.total_N[at],
         flags={"saturation": flags.saturated, "stuck_samples": flags.stuck, "outliers": flags.outlier},
         counted=good,
         ranking=_ranking(path),

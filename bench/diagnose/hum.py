@@ -57,9 +57,10 @@ def find(start_s: float, sample_s: float, parts: list[Part]) -> Line | None:
     width = max(len(power) // 60, 25)
     around = _running_median(power, width) / np.log(2.0)
     excess = np.where(usable, power / np.maximum(around, 1e-300), 0.0)
-    k = int(np.argmax(excess))
-    if excess[k] < np.log(usable.sum() / LEVEL):
+    lines = excess > np.log(usable.sum() / LEVEL)
+    if not lines.any():
         return None
+    k = int(np.argmax(np.where(lines, power - around, -np.inf)))  # the strongest: a harmonic may stand out more
     spacing = frequency[1] - frequency[0]
     found = minimize_scalar(
         lambda f: -_taken(t, e, f)[0], bounds=(frequency[k] - spacing, frequency[k] + spacing), method="bounded",

@@ -28,6 +28,8 @@ class Fit:
     chi2: float
     matrix: Array
     converged: bool
+    spread: Array | None = None
+    """Covariance of x (P, P) that holds for noise of any colour, where it was worked out."""
 
     @property
     def free(self) -> int:
@@ -37,7 +39,9 @@ class Fit:
         return int(inside.sum())
 
     def covariance(self) -> Array:
-        """Of x (P, P), for white noise; 0 at bounds."""
+        """Of x (P, P), 0 at bounds: `spread`, or else for white noise."""
+        if self.spread is not None:
+            return self.spread
         s, scale = self.structure, np.sqrt(np.maximum(np.diag(self.matrix), 1e-300))
         inside = (self.x > s.lower) & (self.x < s.upper) & (np.diag(self.matrix) > 1e-9)
         out = np.zeros_like(self.matrix)
@@ -59,8 +63,8 @@ def force_at(data: Data, structure: Structure, x: Array) -> Array:
 
 
 def errors(data: Data, structure: Structure, x: Array) -> Array:
-    """√w (F − F_simulated)/σ on the grid (n,)."""
-    return np.asarray(np.sqrt(data.weight) / data.sigma_N * (data.force_N - force_at(data, structure, x)))
+    """√w (F − F_simulated)/σ on the grid (n,), whitened."""
+    return data.whitened(data.force_N - force_at(data, structure, x))
 
 
 def chi2(data: Data, structure: Structure, x: Array) -> float:
@@ -78,8 +82,7 @@ def mean_square(data: Data, structure: Structure, x: Array) -> float:
 def jacobian(
     data: Data, structure: Structure, x: Array, force: Array | None = None, known: Array | None = None
 ) -> Array:
-    """∂(√w F/σ)/∂x (n, P), one-sided differences away from the bounds; the first columns are those of `known`."""
-    scale = np.sqrt(data.weight) / data.sigma_N
+    """∂(√w F/σ)/∂x (n, P), whitened, by differences to the side away from the bounds; the first columns: `known`."""
     base = force_at(data, structure, x) if force is None else force
     lower, upper = structure.lower, structure.upper
     out = np.empty((data.size, len(x)))
@@ -92,7 +95,7 @@ def jacobian(
             h = -h
         moved = x.copy()
         moved[j] += h
-        out[:, j] = scale * (force_at(data, structure, moved) - base) / h
+        out[:, j] = data.whitened(force_at(data, structure, moved) - base) / h
     return out
 
 
@@ -118,7 +121,6 @@ def refit(
     `known`: derivatives by the first numbers that are near enough to those here, for the first steps of a search.
     """
     prior = structure.prior
-    scale = np.sqrt(data.weight) / data.sigma_N
     last: list[Array] = []  # x, force and derivatives of the step before
     steps = 0
 
@@ -133,7 +135,7 @@ def refit(
             way = x - before
             square = float(np.sum(way * way))
             if square > 0.0:
-                J = J + np.outer((scale * (force - then) - np.sum(J * way, axis=1)) / square, way)
+                J = J + np.outer((data.whitened(force - then) - np.sum(J * way, axis=1)) / square, way)
         steps += 1
         last[:] = [x.copy(), force, J]
         return J
@@ -141,7 +143,7 @@ def refit(
     def normal(x: Array) -> tuple[float, Array, Array]:
         force = force_at(data, structure, x)
         J = derivatives(x, force)
-        e = scale * (data.force_N - force)
+        e = data.whitened(data.force_N - force)
         value = float(np.sum(e * e) + np.sum(prior * x**2))
         gradient, matrix = products(e, J)
         return value, gradient - prior * x, matrix + np.diag(prior)

@@ -32,7 +32,7 @@ def remains(data: Data, residual_N: Array, simulated_N: Array, colour: Colour, s
     use = np.flatnonzero(data.weight > 0)
     if len(use) < 60:
         return []
-    e = residual_N[use] / data.sigma_N[use]
+    e = data.whitened(residual_N)[use]
     groups = _groups(data, use)
     made = len(groups) + 1
     out = []

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sim.effects import Form
 
-from .candidates import Reach, Signatures, Start, forms, starts
+from .candidates import Reach, Signatures, Start, forms, is_rich, starts
 from .data import Prepared
 from .evidence import Evidence, believable, evidence_of, penalty
 from .numbers import Cause, Structure, cause_of
@@ -77,6 +77,7 @@ class Search:
             travel_mm=float(np.ptp(full.position_mm)),
             depth_mm=prepared.depth_mm,
             force_N=prepared.force_scale_N,
+            rich=structure.in_air or is_rich(full),
         )
 
     # --- the believed structure ------------------------------------------------------------------------------------
@@ -277,7 +278,7 @@ class Search:
         """Whether the step from one fit to the next is more than chance, and more than a crumb."""
         short = self.short
         change = force_at(short, after.structure, after.x) - force_at(short, before.structure, before.x)
-        direction = (np.sqrt(short.weight > 0) * change / short.sigma_N)[self.prepared.owner]
+        direction = self.prepared.full.whitened(change[self.prepared.owner])
         inflation = self.prepared.colour.inflation(direction)
         return evidence_of(before, after, base, inflation, self.samples)
 

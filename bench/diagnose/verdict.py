@@ -51,7 +51,7 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
     n, memory = float(prepared.full.weight.sum()), prepared.colour.memory
     out = []
     for number, (square, fit) in enumerate(zip(squares, fits, strict=True)):
-        doubt = floor_N**2 * (2.0 * np.sqrt(2.0 * memory / n) + 2.0 * fit.free * memory / n)
+        doubt = 2.0 * prepared.floor_square_std + floor_N**2 * 2.0 * fit.free * memory / n
         excess = square - floor_N**2
         joined = number == 0 and len(fits) > 1
         out.append(max(excess, 0.0) if joined or excess > doubt else 0.0)
@@ -97,10 +97,10 @@ def _tempered(effective: float, share: float) -> float:
     return min(effective, 6.0 + 400.0 * (1.0 - share))
 
 
-def described(fit: Fit, index: int, inflation: float) -> tuple[str, str, dict[str, Number]]:
+def described(fit: Fit, index: int) -> tuple[str, str, dict[str, Number]]:
     """(id, form, numbers with standard errors) of a cause of a fit on all the data."""
     cause = fit.structure.causes[index]
-    covariance = fit.covariance() * inflation
+    covariance = fit.covariance()
     at = fit.structure.of_cause(index)
     values = fit.structure.values(fit.x)[index]
     out: dict[str, Number] = {}
@@ -122,12 +122,10 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
     """The causes as the result has them. `final`: polished on all the data."""
     own = len(search.believed.causes)
     out = []
-    n = max(search.samples - final.free, 1.0)
-    overall = max(final.chi2 / n, 1.0)
     for k, gain in enumerate(gains):
         own_trial, rivals, before = stage_of(path, final.structure.causes[own + k].id)
         others, confidence = alternatives(search, own_trial.fit, before, rivals) if own_trial else ([], 0.5)
-        id_, form, numbers = described(final, own + k, overall * search.prepared.colour.memory**0.5)
+        id_, form, numbers = described(final, own + k)
         effect = final.structure.causes[own + k].effect
         values = {name: number.value for name, number in numbers.items()}
         out.append(CauseFound(id_, form, numbers, gain, confidence, others, explain(effect, values), effect.check))

@@ -31,7 +31,7 @@ def model_of(believed: Model, fit: Fit, prepared: Prepared, limit_N: float | Non
         entry["contact"] = "unilateral" if pad.unilateral else "bonded"
     content["pad"] = entry
     effects = []
-    covariance = fit.covariance() * max(fit.chi2 / max(float(prepared.full.weight.sum()) - fit.free, 1.0), 1.0)
+    covariance = fit.covariance()
     for index, (cause, values) in enumerate(zip(structure.causes, structure.values(fit.x), strict=True)):
         row: dict[str, Any] = {"id": cause.id, "form": cause.form.name}
         position = structure.of_cause(index).start

@@ -46,11 +46,11 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
     believed = np.diag(objective.prior_of(problem, estimate.structure)) * problem.noise_square
     by_colour = inverse @ (spread_through(sensitivity, colour.gamma) + believed) @ inverse
     window = int(min(np.ceil(2 * colour.memory), max(len(e) for e in errors)))
-    by_scores = inverse @ (_windowed(scores, window) + believed) @ inverse
+    by_scores = inverse @ (windowed(scores, window) + believed) @ inverse
     independent = sum(len(e) for e in errors) / colour.memory
     freedom = max(independent - float(free.sum()), 1.0)
     even, uneven = np.diag(by_colour), np.diag(by_scores) * independent / freedom
-    doubt = np.sqrt(2 / _contributions(scores, inverse, window))
+    doubt = np.sqrt(2 / contributions(scores, inverse, window))
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.where(even > 0, uneven / even, 1.0)
     ratio = np.where(ratio > 1 + TELLING * doubt, ratio, 1.0)
@@ -75,7 +75,7 @@ def independent_samples(problem: Problem, x: Array, structure: Structure) -> flo
     return max(sum(len(e) for e in errors) / plain_colour(errors).memory, 10.0)
 
 
-def _contributions(scores: list[Array], inverse: Array, window: int) -> Array:
+def contributions(scores: list[Array], inverse: Array, window: int) -> Array:
     """How many independent stretches of the data carry each variable, (P,): (Σ q)²/Σ q² of their squares."""
     first, second = np.zeros(inverse.shape[0]), np.zeros(inverse.shape[0])
     for g in scores:

@@ -1,9 +1,9 @@
 """Inertia: the cell accelerates the mass beyond it, and feels the force that takes.
 
-- `rigid`: mass · acceleration of the probe. The acceleration is the second divided difference of the positions, carried
-  half the way to the end of the step by its own change since the one before: no carrying is late by a window, and a
-  whole one overshoots where the acceleration jumps, as it does in planned moves. What is left is a lag of half a window
-  or a little more. Earlier positions are taken at least seven tenths of `window` apart: noise of position grows with
+- `rigid`: mass · acceleration of the probe. The acceleration is the second divided difference of the positions: exact
+  where it is constant, as in planned moves, and late by some half a window where it changes smoothly. `lead` carries it
+  on by that share of its own change since the one before: half makes up for most of the lateness, a whole one
+  overshoots. Earlier positions are taken at least seven tenths of `window` apart: noise of position grows with
   1/window², and stamps of two interleaved clocks come close together.
 - `damped`: mass · (acceleration + damping_rate · speed), a mass in oil or with a cable dragging.
 - `sprung`: the mass sits on a spring and damper of its own: natural frequency and damping ratio. Exact for an
@@ -27,14 +27,13 @@ _AGES = 1
 _PLACES = 5
 _KNOTS = 4
 _APART = 0.7
-_CARRY = 0.5
 _KG_MM = 1e-3
 """N per kg mm/s²."""
 
 
 @block
 def rigid(dt: float, y: float, state: State, p: State) -> float:
-    """Force on the mass in N; p = (mass, damping_rate, window).
+    """Force on the mass in N; p = (mass, damping_rate, window, lead).
 
     State: the last four knots, newest first: time since each, and position there.
     """
@@ -53,7 +52,7 @@ def rigid(dt: float, y: float, state: State, p: State) -> float:
     earlier = (y2 - y3) / (p3 - p2)
     newer = 2.0 * (speed - before) / p2  # a third of p1 + p2 ago
     older = 2.0 * (before - earlier) / (p3 - p1)  # p3/3 earlier still
-    acceleration = newer + _CARRY * (newer - older) * min((p1 + p2) / p3, 1.5)
+    acceleration = newer + p[3] * (newer - older) * min((p1 + p2) / p3, 1.5)
     if state[_AGES] >= 0.999999 * p[2]:
         for i in range(_KNOTS - 1, 0, -1):
             state[_AGES + i] = state[_AGES + i - 1]
@@ -85,6 +84,9 @@ def sprung(dt: float, y: float, state: State, p: State) -> float:
 
 
 _MASS = Parameter("mass", "kg", 0.0, 50.0, 0.1, "mass beyond the cell", required=True, amplitude=True)
+_LEAD = Parameter(
+    "lead", "1", 0.0, 0.6, 0.0, "share of its change that an acceleration is carried on by", starts=(0.0, 0.5)
+)
 _WINDOW = Parameter(
     "window", "s", 1e-5, 0.02, 0.002, "least time over which acceleration is taken", starts=(2e-4, 1e-3, 3e-3)
 )
@@ -99,10 +101,10 @@ EFFECT = Effect(
         Form(
             name="rigid",
             what="mass times acceleration",
-            parameters=(_MASS, _WINDOW),
+            parameters=(_MASS, _WINDOW, _LEAD),
             blocks={"probe": rigid},
             state=(0.0,) * 9,
-            pack=lambda values: (values["mass"], 0.0, values["window"]),
+            pack=lambda values: (values["mass"], 0.0, values["window"], values["lead"]),
         ),
         Form(
             name="damped",
@@ -111,6 +113,7 @@ EFFECT = Effect(
                 _MASS,
                 Parameter("damping_rate", "1/s", 0.0, 1e4, 10.0, "drag over mass and speed", starts=(5.0, 50.0)),
                 _WINDOW,
+                _LEAD,
             ),
             blocks={"probe": rigid},
             state=(0.0,) * 9,
