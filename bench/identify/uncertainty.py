@@ -146,7 +146,7 @@ def _late(problem: Problem, estimate: Estimate) -> list[Array]:
     return out
 
 
-def _windowed(scores: list[Array], width: int) -> Array:
+def windowed(scores: list[Array], width: int) -> Array:
     """Σ_kl w(k−l) g_k g_lᵀ with Bartlett's w, by sums over all windows of `width` samples."""
     P = scores[0].shape[1]
     out = np.zeros((P, P))

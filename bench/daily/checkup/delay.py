@@ -21,6 +21,7 @@ from bench import identify
 from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.refit import mean_square, refit
+from bench.diagnose.spread import covariance
 from bench.diagnose.verdict import described
 from bench.recording.types import ForceChannel, MotorChannel, Recording
 from sim.model import Model
@@ -73,9 +74,7 @@ def in_contact(recording: Recording) -> Delay | None:
     prepared = prepare(later, np.ones(later.force_N.size, dtype=bool))
     structure = believed_structure(Model.model_validate(content), prepared)
     fit = refit(prepared.full, structure, structure.x(structure.pad.x()), 60, 1e-9)
-    free = max(float(prepared.full.weight.sum()) - fit.free, 1.0)
-    inflation = max(fit.chi2 / free, 1.0) * prepared.colour.memory**0.5
-    number = described(fit, 0, inflation)[2]["delay"]
+    number = described(replace(fit, spread=covariance(prepared.full, fit)), 0)[2]["delay"]
     if not math.isfinite(number.std) or number.std > MOST_DOUBT_S:
         return None
     rms_N = math.sqrt(mean_square(prepared.full, structure, fit.x))
