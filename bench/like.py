@@ -152,7 +152,7 @@ def _spoiled_beside(measurement: Measurement, simulated_N: Array, rmse_N: float,
         return flagged
     alone = faults(measurement.force_N)
     faulty = alone.saturated | alone.stuck
-    return faulty | standing_off(measurement.force_N - simulated_N, ~faulty)
+    return faulty | standing_off(measurement.force_N - simulated_N, ~faulty, alone.outlier)
 
 
 def _least(cost: Callable[[float], float], std_mm: float) -> float:

@@ -18,13 +18,17 @@ from bench.recording.types import Measurement
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+FEW_REPEATS = 4  # equal pairs that are no accident where digits are many
 CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
 SETTLING = 20  # samples after a move that are not yet a hold
 CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
 CEILING = 8  # samples in a row at the greatest force
 BESIDE = 5  # neighbours on either side that a stray sample is held against: bursts are shorter
+ASIDE, CALM = 8, 0.6  # neighbours on either side of a residual, and the share of them that a burst leaves alone
 FAR = 6.0  # noise deviations that an outlier stands off at the least
+BULK = 9.0  # medians of the size: within some six deviations of white noise
 DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
+FALSE_SHARE, SEVERAL = 0.02, 10  # of values beyond the limit that may be noise, where at least so many lie there
 RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data
 
 
@@ -98,7 +102,7 @@ def _stuck(force: Array, but: Mask) -> Mask:
     # how often a sample equals the one before when nothing sticks: judged where values change most
     same = np.concatenate([[0.0], (np.diff(force) == 0).astype(float)])
     if step == 0.0:
-        least = 3 if np.mean(same) < 0.2 else 4
+        least = 2 if _never_equal(force, int(same.sum())) else 3 if np.mean(same) < 0.2 else 4
     else:
         window = max(len(force) // 40, 20)
         shares = np.convolve(same, np.ones(window) / window, mode="same")
@@ -108,6 +112,15 @@ def _stuck(force: Array, but: Mask) -> Mask:
         if count >= least and not but[start]:
             mask[start + 1 : start + count] = True
     return mask
+
+
+def _never_equal(force: Array, repeats: int) -> bool:
+    """Whether samples have so many digits that two in a row agree by chance far less often than `repeats` times."""
+    steps = np.diff(np.unique(force))
+    finest = float(steps.min()) if len(steps) else 0.0
+    change = 1.4826 * float(np.median(np.abs(np.diff(force))))
+    expected = len(force) * finest / max(np.sqrt(2.0 * np.pi) * change, 1e-300)
+    return repeats >= FEW_REPEATS and repeats > 8.0 * expected
 
 
 def _spikes(force: Array, good: Mask) -> Mask:
@@ -134,18 +147,31 @@ def _spikes(force: Array, good: Mask) -> Mask:
 def far(values: Array) -> float:
     """Distance from 0 beyond which a value (n,) is no noise, by the tail that its bulk foretells (Student's t).
 
-    The tail is read off the quantiles at 50, 80 and 95 %, which a few per cent of outliers hardly move.
+    Degrees and scale are those under which the values within `BULK` medians are likeliest, counted in bins: what lies
+    further out has no say.
     """
     size = np.abs(values)
-    q50, q80, q95 = (float(q) for q in np.quantile(size, [0.5, 0.8, 0.95]))
+    q50 = float(np.median(size))
     if q50 <= 0.0:
         return np.inf
-    ratios = np.stack([np.asarray(student_t.ppf(q, DEGREES)) for q in (0.9, 0.975)], axis=1)
-    ratios /= np.asarray(student_t.ppf(0.75, DEGREES))[:, None]
-    k = int(np.argmin((ratios[:, 0] - q80 / q50) ** 2 * 4.0 + (ratios[:, 1] - q95 / q50) ** 2))
-    degrees = float(DEGREES[k])
-    scale = q50 / float(student_t.ppf(0.75, degrees))
-    return scale * max(float(student_t.isf(RARE / len(values) / 2, degrees)), FAR)
+    edges = np.concatenate([np.linspace(0.0, 4.0, 33), np.linspace(4.0, BULK, 15)[1:]])
+    counts = np.histogram(size / q50, edges)[0]
+    shrinks = np.linspace(0.85, 1.15, 25)  # of the scale that the median tells
+    degrees, shrink = np.meshgrid(DEGREES, shrinks, indexing="ij")
+    scale = shrink / np.asarray(student_t.ppf(0.75, DEGREES))[:, None]
+    within = np.asarray(student_t.cdf(edges / scale[..., None], degrees[..., None]))
+    shares = np.diff(within, axis=-1) / (within[..., -1:] - 0.5)
+    likelihood = np.sum(counts * np.log(np.maximum(shares, 1e-300)), axis=-1)
+    best = np.unravel_index(int(np.argmax(likelihood)), likelihood.shape)
+    # beyond it noise alone puts less than one value in a hundred such data, or a small share of those that lie there
+    unit = q50 * float(scale[best])
+    beyond = np.sort(size[size > FAR * unit])[::-1] / unit
+    foretold = 2.0 * len(values) * np.asarray(student_t.sf(beyond, degrees[best]))
+    allowed = np.flatnonzero(foretold <= FALSE_SHARE * np.arange(1, len(beyond) + 1))
+    rare = float(student_t.isf(RARE / len(values) / 2, degrees[best]))
+    if len(allowed) >= SEVERAL:
+        rare = min(rare, float(beyond[allowed[-1]]) * (1.0 - 1e-9))
+    return unit * max(rare, FAR)
 
 
 def not_of_the_motion(m: Measurement, found: Faults) -> Faults:
@@ -164,17 +190,21 @@ def not_of_the_motion(m: Measurement, found: Faults) -> Faults:
     return found
 
 
-def standing_off(residual: Array, good: Mask) -> Mask:
-    """Outliers against a model: single residuals (m,) far beyond their neighbours'."""
+def standing_off(residual: Array, good: Mask, suspect: Mask) -> Mask:
+    """Outliers against a model: residuals (m,), single or in short bursts, far beyond most of their neighbours'.
+
+    `suspect` (m,): those that stood off before there was a model, and for which half the distance is enough.
+    """
     mask = np.zeros(len(residual), dtype=bool)
     index = np.flatnonzero(good)
     if len(index) < 30:
         return mask
     e = residual[index]
-    padded = np.pad(e, 4, mode="edge")
-    around = np.stack([padded[k : k + len(e)] for k in (0, 1, 2, 3, 5, 6, 7, 8)])
-    off = np.abs(e - np.median(around, axis=0))
-    calm = np.sort(np.abs(around - np.median(around, axis=0)), axis=0)[-2]
-    limit = far(e - np.median(around, axis=0))
-    mask[index[off > limit + 4.0 * calm]] = True
+    padded = np.pad(e, ASIDE, mode="edge")
+    around = np.stack([padded[k : k + len(e)] for k in range(2 * ASIDE + 1) if k != ASIDE])
+    middle = np.median(around, axis=0)
+    calm = np.quantile(np.abs(around - middle), CALM, axis=0)
+    limit = far(e - middle)
+    limits = np.where(suspect[index], 0.5, 1.0) * limit
+    mask[index[np.abs(e - middle) > limits + 3.0 * np.maximum(calm - float(np.median(calm)), 0.0)]] = True
     return mask

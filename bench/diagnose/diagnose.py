@@ -138,7 +138,7 @@ def _asked_again(
     errors = np.full(len(m.force_N), np.nan)
     errors[prepared.kept] = residual[prepared.at]
     known = np.isfinite(errors) & ~(flags.saturated | flags.stuck)
-    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known)
+    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, flags.outlier)
     if outlier.sum() == flags.outlier.sum() and np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
     flags = not_of_the_motion(m, replace(flags, outlier=outlier))

@@ -1,13 +1,14 @@
 """Viscous damping of the pad: force against the speed of its surface, on top of relaxation, while in contact.
 
 Speed is that of the surface over the step, as positions are linear between samples. All forms oppose the motion, so
-they only ever take energy.
+they only ever take energy. `coefficient` is force over speed at `SPEED_MM_S`, and at the depth `at_depth` where it
+depends on depth: in the middle of what benches do, where forms agree on it, and not at an end that none was seen at.
 
 - `linear`: coefficient · v, Kelvin and Voigt's dashpot.
-- `hunt_crossley`: coefficient · δ^n v, which starts at 0 at touch as measured impacts do (K. H. Hunt, F. R. E.
+- `hunt_crossley`: coefficient · (δ/at_depth)^n v, which starts at 0 at touch as measured impacts do (K. H. Hunt, F. R. E.
   Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42, 1975, 440–445).
-- `with_stiffness`: coefficient · e^(aδ) v, damping in proportion to a stiffness that grows exponentially.
-- `power`: coefficient · v (v² + v_0²)^((n−1)/2): shear thinning below n = 1, linear under v_0 = 0.05 mm/s.
+- `with_stiffness`: coefficient · e^(a(δ − at_depth)) v, damping in proportion to a stiffness that grows exponentially.
+- `power`: coefficient · v ((v² + v_0²)/(SPEED_MM_S² + v_0²))^((n−1)/2): shear thinning below n = 1, linear under v_0 = 0.05 mm/s.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ import math
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
+SPEED_MM_S = 20.0
+"""Speed at which `coefficient` is force over speed."""
 _SLOW = 0.05
 """Speed below which `power` is linear, mm/s: a root has no slope at rest."""
 
@@ -31,20 +34,20 @@ def linear(dt: float, depth: float, state: State, p: State) -> float:
 
 @block
 def hunt_crossley(dt: float, depth: float, state: State, p: State) -> float:
-    """Dashpot that grows with depth; p = (coefficient, exponent)."""
+    """Dashpot that grows with depth; p = (coefficient, exponent, at_depth)."""
     moved = max(depth, 0.0) - max(state[0], 0.0)
     state[0] = depth
     if dt <= 0.0 or depth <= 0.0:
         return 0.0
-    return float(p[0] * depth ** p[1] * moved / dt)
+    return float(p[0] * (depth / p[2]) ** p[1] * moved / dt)
 
 
 @block
 def with_stiffness(dt: float, depth: float, state: State, p: State) -> float:
-    """Dashpot that grows exponentially with depth; p = (coefficient, growth)."""
+    """Dashpot that grows exponentially with depth; p = (coefficient, growth, at_depth)."""
     moved = max(depth, 0.0) - max(state[0], 0.0)
     state[0] = depth
-    return p[0] * math.exp(p[1] * max(depth, 0.0)) * moved / dt if dt > 0.0 else 0.0
+    return p[0] * math.exp(p[1] * (max(depth, 0.0) - p[2])) * moved / dt if dt > 0.0 else 0.0
 
 
 @block
@@ -55,7 +58,8 @@ def power(dt: float, depth: float, state: State, p: State) -> float:
     if dt <= 0.0:
         return 0.0
     speed = moved / dt
-    return float(p[0] * speed * (speed * speed + _SLOW * _SLOW) ** (0.5 * (p[1] - 1.0)))
+    square = (speed * speed + _SLOW * _SLOW) / (SPEED_MM_S * SPEED_MM_S + _SLOW * _SLOW)
+    return float(p[0] * speed * square ** (0.5 * (p[1] - 1.0)))
 
 
 def _coefficient(what: str) -> Parameter:
@@ -63,6 +67,8 @@ def _coefficient(what: str) -> Parameter:
         "coefficient", "N*s/mm", 0.0, 100.0, 0.005, what, required=True, amplitude=True, starts=(0.002, 0.02)
     )
 
+
+_AT_DEPTH = Parameter("at_depth", "mm", 1e-3, 100.0, 1.0, "depth at which the coefficient holds", fixed=True)
 
 EFFECT = Effect(
     id="viscous_damping",
@@ -82,8 +88,9 @@ EFFECT = Effect(
             name="hunt_crossley",
             what="in proportion to speed and to a power of the depth",
             parameters=(
-                _coefficient("force per speed at 1 mm of depth"),
-                Parameter("exponent", "1", 0.1, 5.0, 1.0, "power of the depth in mm", starts=(0.5, 1.0, 1.5)),
+                _coefficient("force per speed at `at_depth`"),
+                Parameter("exponent", "1", 0.1, 5.0, 1.0, "power of the depth", starts=(0.5, 1.0, 1.5)),
+                _AT_DEPTH,
             ),
             blocks={"contact": hunt_crossley},
             state=(0.0,),
@@ -92,8 +99,9 @@ EFFECT = Effect(
             name="with_stiffness",
             what="in proportion to speed and to a stiffness that grows with depth",
             parameters=(
-                _coefficient("force per speed at the surface"),
+                _coefficient("force per speed at `at_depth`"),
                 Parameter("growth", "1/mm", -2.0, 10.0, 0.7, "exponential growth with depth", starts=(0.3, 1.0)),
+                _AT_DEPTH,
             ),
             blocks={"contact": with_stiffness},
             state=(0.0,),
@@ -102,8 +110,8 @@ EFFECT = Effect(
             name="power",
             what="to a power of the speed",
             parameters=(
-                _coefficient("force at 1 mm/s"),
-                Parameter("exponent", "1", 0.35, 1.6, 0.6, "power of the speed in mm/s", starts=(0.5, 0.7, 1.3)),
+                _coefficient("force per speed at 20 mm/s"),
+                Parameter("exponent", "1", 0.35, 1.6, 0.6, "power of the speed", starts=(0.5, 0.7, 1.3)),
             ),
             blocks={"contact": power},
             state=(0.0,),

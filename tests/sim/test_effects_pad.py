@@ -238,9 +238,9 @@ class TestViscousDamping:
         ("form", "more", "factor"),
         [
             ("linear", {}, lambda x: 4.0),
-            ("hunt_crossley", {"exponent": 1.5}, lambda x: 4.0 * x**1.5),
-            ("with_stiffness", {"growth": 0.7}, lambda x: 4.0 * np.exp(0.7 * x)),
-            ("power", {"exponent": 0.5}, lambda x: 2.0),
+            ("hunt_crossley", {"exponent": 1.5, "at_depth": 0.8}, lambda x: 4.0 * (x / 0.8) ** 1.5),
+            ("with_stiffness", {"growth": 0.7, "at_depth": 0.8}, lambda x: 4.0 * np.exp(0.7 * (x - 0.8))),
+            ("power", {"exponent": 0.5}, lambda x: 4.0 * (4.0 / 20.0) ** -0.5),
         ],
     )
     def test_force_at_a_steady_speed(self, form: str, more: dict[str, float], factor) -> None:
