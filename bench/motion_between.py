@@ -91,6 +91,17 @@ def planned_moves(time_s: Array, position_mm: Array, clean_mm: Array, noise_mm: 
         n = len(off)
         if n >= LEAST and float(np.sum(off**2)) <= 1.2 * n + AGREED * np.sqrt(2.0 * n):
             out[a, b] = move
+    return _apart(out)
+
+
+def _apart(moves: Moves) -> Moves:
+    """The same moves, each ending where the next begins at the latest."""
+    out: Moves = {}
+    pairs = sorted(moves.items())
+    for k, ((first, last), move) in enumerate(pairs):
+        following = pairs[k + 1][0][0] if k + 1 < len(pairs) else last
+        if first < min(last, following):
+            out[first, min(last, following)] = move
     return out
 
 

@@ -85,7 +85,7 @@ def sprung(dt: float, y: float, state: State, p: State) -> float:
 
 _MASS = Parameter("mass", "kg", 0.0, 50.0, 0.1, "mass beyond the cell", required=True, amplitude=True)
 _LEAD = Parameter(
-    "lead", "1", 0.0, 0.6, 0.0, "share of its change that an acceleration is carried on by", starts=(0.0, 0.5)
+    "lead", "1", 0.0, 0.6, 0.5, "share of its change that an acceleration is carried on by", starts=(0.0, 0.5)
 )
 _WINDOW = Parameter(
     "window", "s", 1e-5, 0.02, 0.002, "least time over which acceleration is taken", starts=(2e-4, 1e-3, 3e-3)

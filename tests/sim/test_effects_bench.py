@@ -203,13 +203,22 @@ class TestInertia:
         expected = 0.2e-3 * (1000.0 + drag.get("damping_rate", 0.0) * 1000.0 * self.t)
         assert_allclose(force[20:], expected[20:], rtol=1e-7)
 
-    def test_the_lag_is_about_half_a_window(self) -> None:
+    @pytest.mark.parametrize(("lead", "least", "most"), [(0.0, 0.75, 1.4), (0.5, 0.4, 0.75)])
+    def test_the_lag_is_a_window_less_what_is_carried_on(self, lead: float, least: float, most: float) -> None:
         x = 300.0 * self.t**3
         for window in (1e-3, 4e-3):
-            force = simulate(AIR, [active("inertia", mass=0.5, window=window)], self.t, x)
+            force = simulate(AIR, [active("inertia", mass=0.5, window=window, lead=lead)], self.t, x)
             lag = self.t - force / (0.5e-3 * 1800.0)
-            assert (lag[40:] > 0.4 * window).all()
-            assert (lag[40:] < 0.75 * window).all()
+            assert (lag[40:] > least * window).all()
+            assert (lag[40:] < most * window).all()
+
+    def test_a_planned_acceleration_is_felt_at_once(self) -> None:
+        """Two nodes in the new phase are enough for the third to be exact."""
+        t = np.array([0.0, 1e-3, 2e-3, 2.4e-3, 2.6e-3, 2.8e-3, 3e-3, 4e-3, 5e-3])
+        x = 0.5 * 5000.0 * np.maximum(t - 2.4e-3, 0.0) ** 2
+        force = simulate(AIR, [active("inertia", mass=0.4, window=1e-5, lead=0.0)], t, x)
+        assert_allclose(force[:4], 0.0, atol=1e-12)
+        assert_allclose(force[5:], 0.4e-3 * 5000.0, rtol=1e-9)
 
     def test_uneven_times(self) -> None:
         rng = np.random.default_rng(2)
