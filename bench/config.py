@@ -169,7 +169,7 @@ class Bench(_Part):
         if self.simulation is None:
             return None
         name = self.simulation.pad
-        if self._source is not None and (self._source.parent / name).is_file():
+        if self._source is not None and _is_file(self._source.parent / name):
             return self._source.parent / name
         shipped = find_shipped("pad", name)
         if shipped is not None:
@@ -218,12 +218,20 @@ def load_bench(name_or_path: str | Path = "simulated") -> Bench:
     return bench
 
 
+def _is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that no file can have (too long, a zero byte) is that of none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def _with_map(bench: Bench, key: Literal["motor", "load_cell"], document: Document) -> MotorSpec | LoadCellSpec:
     """The device's spec with its register map read, if it names a file, and checked."""
     spec: MotorSpec | LoadCellSpec = getattr(bench, key)
     if isinstance(spec.map, str):
         path = document.path.parent / spec.map
-        if not path.is_file():
+        if not _is_file(path):
             cure = "it is relative to the bench file"
             raise document.error((key, "map"), f"there is no file `{spec.map}`", cure)
         content = read_yaml(path)

@@ -42,8 +42,7 @@ first cause is named in the message and the recording, the data are kept, and th
 force and travel than its limits and the way to stop. **Refused to start**: exit code 2, nothing was commanded.
 
 `tests/faults/test_kinds.py` has each row of the tables happen to a run, and looks at the simulated world, not at what
-the host believes. A row shows the fault as the file would have it (without `kind` and `device`). Where it says "not
-yet", the outcome is what is to be.
+the host believes. A row shows the fault as the file would have it (without `kind` and `device`).
 `tests/fault_campaign` draws faults at random on protocols at random:
 
     .venv/bin/python -m tests.fault_campaign --seeds 0:10000 --jobs 2
@@ -78,12 +77,7 @@ def describe(parameter: Parameter) -> str:
 def row(reaction: Reaction) -> str:
     """A row of a kind's table."""
     on = "" if reaction.bench == "simulated" else f" ({reaction.bench.removeprefix('simulated_')})"
-    why = (
-        f"{reaction.why}{'; ' if reaction.why else ''}**not yet**: {reaction.not_yet}"
-        if reaction.not_yet
-        else reaction.why
-    )
-    return f"| {reaction.device}{on} | `{entry(reaction.fault)}` | {reaction.outcome} | {why} |"
+    return f"| {reaction.device}{on} | `{entry(reaction.fault)}` | {reaction.outcome} | {reaction.why} |"
 
 
 def section(kind: Kind) -> list[str]:

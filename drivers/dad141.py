@@ -134,6 +134,8 @@ class Dad141:
         yield Exchange("SW", b"SW\r", None, lambda _frame, _sent, _received: None, 0.0)
         end_s = self.link.clock.now() + FIRST_LINE_S
         while not self._samples:
+            if self.link.broken is not None:
+                raise self.link.broken
             if self._refused:
                 raise ExceptionReply(self.name, "the device refuses continuous output (SW)")
             if self.link.clock.now() > end_s:

@@ -126,6 +126,8 @@ class MtSics:
         yield _unanswered(b"SIR\r\n")
         end_s = self.link.clock.now() + FIRST_LINE_S
         while not self._samples:
+            if self.link.broken is not None:
+                raise self.link.broken
             if self._refused is not None:
                 raise ExceptionReply(self.name, f"the device refuses continuous output (SIR): {ERRORS[self._refused]}")
             if self.link.clock.now() > end_s:

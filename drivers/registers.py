@@ -12,7 +12,7 @@ from drivers.errors import DriverError, ReadbackError
 from drivers.modbus import ModbusClient
 from drivers.motor import MotorIdentity, MotorLimits, MotorSample, SafeState
 from drivers.regmap import MotorMap, WriteBlock
-from drivers.sequence import Sequencer, Signals, raw_number
+from drivers.sequence import Sequencer, Signals, code_name, raw_number
 from drivers.values import encode
 from drivers.wire import Exchange, Link, Steps
 
@@ -55,6 +55,13 @@ class RegisterMotor:
     def has_watchdog(self) -> bool:
         """Whether the device stops by itself when the host is gone."""
         return "watchdog" in self.map.clamps
+
+    @property
+    def slowest_mm_s(self) -> float:
+        """The slowest speed that a move can be told: the device's count, or the map's bound; 0 where it has neither."""
+        fields = [field for step in self.map.move if isinstance(step, WriteBlock) for field in step.fields]
+        speeds = [field for field in fields if field.variable == "speed"]
+        return max((field.factor * (field.min or float(field.type != "f32")) for field in speeds), default=0.0)
 
     # -- identity and clamps -----------------------------------------------------------------------------------
 
@@ -252,6 +259,5 @@ class RegisterMotor:
         names = [bit for index, bit in enumerate(self.map.faults) if fault >> FAULT_BIT_SHIFT + index & 1]
         code = fault & 0xFFFF_FFFF
         if code:
-            meaning = self.map.codes.get(code)
-            names.append(f"code {code:#06x}" + (f" ({meaning})" if meaning else ""))
+            names.append(code_name(self.map, code))
         return tuple(names)

@@ -119,8 +119,7 @@ class Bit(_Part):
 class Written(_Part):
     """A number to write: a variable (`from`) or a constant (`to`), in `unit`, as raw = value / scale, rounded.
 
-    `min` and `max` bound the raw number: beyond them the move is refused, never clipped.
-    """
+    `min` and `max` bound the raw number: beyond them the move is refused, never clipped."""
 
     variable: Annotated[str | None, Field(alias="from")] = None
     to: FiniteFloat | None = None
@@ -175,11 +174,12 @@ class WriteBlock(_Write):
 
 
 class Wait(_Part):
-    """Read until all the bits are as said; after `within_s` it has failed."""
+    """Read until all the bits are as said; failed after `within_s`, or where the position stands for `stuck_s`."""
 
     wait: Annotated[dict[str, bool], Field(min_length=1)]
     within_s: Annotated[FiniteFloat, Field(gt=0)]
     every_s: Annotated[FiniteFloat, Field(gt=0)] = 0.02
+    stuck_s: Annotated[FiniteFloat, Field(gt=0)] | None = None
     message: str = "the device does not get there"
 
 

@@ -28,6 +28,12 @@ from drivers.wire import Exchange, Pause, Steps
 
 Words = list[int] | list[bool]
 
+RESET_S = 0.5
+"""A fault code that was there as a wait began may be one that is just being reset: it counts after so long."""
+
+STANDS_MM = 0.05
+"""An axis that is on its way, and goes no further than that, stands still: more than an encoder's last digits."""
+
 
 class Signals:
     """The values and bits of a map, and how to get them out of what a poll of a block returns."""
@@ -39,6 +45,9 @@ class Signals:
         self.block_of_bit = {bit: device.block_of(item) for bit, item in device.bits.items()}
         self.bits: dict[str, bool] = {}
         """Every bit as it was read last."""
+
+        self.words: dict[str, Words] = {}
+        """Every block as it was read last."""
 
     def number(self, value: Value, block: Block, words: Words) -> float:
         """A value in base units (mm, mm/s, mm/s², N, s; or its plain number), out of the block it lies in."""
@@ -55,6 +64,7 @@ class Signals:
     def take_bits(self, block_name: str, words: Words) -> None:
         """Note all bits that lie in a block."""
         block = self.map.blocks[block_name]
+        self.words[block_name] = words
         for bit, item in self.map.bits.items():
             if self.block_of_bit[bit] == block_name:
                 self.bits[bit] = _bit_of(item, words[item.address - block.address])
@@ -66,12 +76,28 @@ class Signals:
             return self.modbus.read_bits(block.table, block.address, block.count)
         return self.modbus.read_registers(block.table, block.address, block.count)
 
-    def refresh(self, bits: Iterable[str]) -> Steps[None]:
-        """Read the blocks that these bits lie in."""
-        blocks = {self.block_of_bit[bit] for bit in bits}
+    def refresh(self, bits: Iterable[str], values: Iterable[str] = ()) -> Steps[None]:
+        """Read the blocks that these bits and values lie in."""
+        blocks = {self.block_of_bit[bit] for bit in bits} | {
+            self.map.block_of(self.map.values[name]) for name in values
+        }
         for block in self.map.blocks:
             if block in blocks:
                 self.take_bits(block, (yield self.poll(block)))
+
+    def code(self) -> int:
+        """The device's own fault code as it was read last; 0 for none, or where the map has none."""
+        value = self.map.values.get("fault") if isinstance(self.map, MotorMap) else None
+        if value is None:
+            return 0
+        name = self.map.block_of(value) or ""
+        return self.raw(value, self.map.blocks[name], self.words[name]) & 0xFFFF_FFFF if name in self.words else 0
+
+    def position(self) -> float:
+        """A motor's position as it was read last, mm, in the device's direction."""
+        value = self.map.values["position"]
+        name = self.map.block_of(value) or ""
+        return self.number(value, self.map.blocks[name], self.words[name])
 
     def read_value(self, name: str) -> Steps[float]:
         """One value, read by itself, in base units."""
@@ -102,8 +128,9 @@ class Sequencer:
     ) -> Steps[None]:
         """One step after the other.
 
-        Waiting ends with `DeviceFault` as soon as one of the map's fault bits is on, unless `faults_count` is False
-        (a device with a fault must still be stopped and released); with `DeviceTimeout` when time is up.
+        Waiting ends with `DeviceFault` as soon as one of the map's fault bits is on or its fault code is not 0, unless
+        `faults_count` is False (a device with a fault must still be stopped and released), and where a position that
+        is to change stands still; with `DeviceTimeout` when time is up.
         """
         for step in steps:
             if isinstance(step, (WriteCoil, WriteRegister, WriteBlock)) and step.when:
@@ -131,23 +158,44 @@ class Sequencer:
 
     def _wait(self, step: Wait, faults_count: bool) -> Steps[None]:
         clock = self.modbus.link.clock
-        end_s = clock.now() + step.within_s
+        begun_s = clock.now()
         watched = [*step.wait, *(self.faults if faults_count else ())]
+        also = ["position"] if step.stuck_s is not None else []
+        if faults_count and isinstance(self.signals.map, MotorMap) and "fault" in self.signals.map.values:
+            also.append("fault")
+        standing: tuple[float, float] | None = None
+        earlier: int | None = None
         while True:
-            yield from self.signals.refresh(watched)
-            bits = self.signals.bits
+            yield from self.signals.refresh(watched, also)
+            bits, now_s = self.signals.bits, clock.now()
             if all(bits[bit] == state for bit, state in step.wait.items()):
                 return
             if faults_count:
-                active = [bit for bit in self.faults if bits[bit]]
-                if active:
-                    raise DeviceFault(self.name, f"{step.message}: {', '.join(active)}", names=tuple(active))
-            if clock.now() >= end_s:
-                wrong = ", ".join(
-                    f"{bit} is {_word(bits[bit])}" for bit, state in step.wait.items() if bits[bit] != state
-                )
+                code = self.signals.code()
+                earlier = code if earlier is None else earlier
+                self._look_at_faults(step, code if code != earlier or now_s - begun_s > RESET_S else 0)
+            wrong = ", ".join(f"{bit} is {_word(bits[bit])}" for bit, state in step.wait.items() if bits[bit] != state)
+            if step.stuck_s is not None:
+                at_mm = self.signals.position()
+                if standing is None or abs(at_mm - standing[1]) > STANDS_MM:
+                    standing = now_s, at_mm
+                elif now_s - standing[0] > step.stuck_s:
+                    raise DeviceFault(
+                        self.name,
+                        f"{step.message}: its position has stood still at {at_mm:.2f} mm for {step.stuck_s:g} s, "
+                        f"and {wrong}; something holds it, or it does not push",
+                    )
+            if now_s >= begun_s + step.within_s:
                 raise DeviceTimeout(self.name, f"{step.message} within {step.within_s:g} s ({wrong})")
             yield Pause(step.every_s)
+
+    def _look_at_faults(self, step: Wait, code: int) -> None:
+        """Raise where a fault bit is on, or the device has a code to tell."""
+        active = [bit for bit in self.faults if self.signals.bits[bit]]
+        if code:
+            active.append(code_name(self.signals.map, code))
+        if active:
+            raise DeviceFault(self.name, f"{step.message}: {', '.join(active)}", code, tuple(active))
 
     def _report_fault(self, message: str, wanted: Mapping[str, bool]) -> None:
         wrong = [bit for bit, state in wanted.items() if self.signals.bits[bit] != state]
@@ -159,6 +207,12 @@ class Sequencer:
         held = yield from self.signals.read_value(step.readback)
         if abs(held - wanted) > step.tolerance:
             raise ReadbackError(self.name, f"{step.readback} should be {wanted:g}, the device holds {held:g}")
+
+
+def code_name(device: MotorMap | LoadCellMap, code: int) -> str:
+    """A device's own fault code, with its meaning where the map has it."""
+    meaning = device.codes.get(code) if isinstance(device, MotorMap) else None
+    return f"code {code:#06x}" + (f" ({meaning})" if meaning else "")
 
 
 def raw_number(name: str, field: Written, variables: Mapping[str, float]) -> float:

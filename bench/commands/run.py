@@ -37,6 +37,7 @@ def main(args: argparse.Namespace) -> int:
     from bench.config import load_bench, load_model, simulated
     from bench.preflight import check
     from bench.protocol import load_protocol
+    from bench.recording.unfinished import left_behind, notice
     from bench.run.folder import discard, make_folder, must_be_free
     from bench.run.runner import Notes, run_protocol
     from bench.shipped import find_file
@@ -58,6 +59,9 @@ def main(args: argparse.Namespace) -> int:
             "  stand there, a hand at its emergency stop, and add --attended (or dry-run it with --simulated)"
         )
     folder = make_folder(protocol.name, args.out, datetime.datetime.now())
+    left = left_behind(folder.parent, bench.name) if not bench.all_simulated else None
+    if left is not None:
+        say(notice(left))
     started = time.perf_counter()
     try:
         with Progress(preflight.duration_s + preflight.approach_s) as progress:
@@ -69,6 +73,8 @@ def main(args: argparse.Namespace) -> int:
                 believed_text=find_file("pad", args.pad).read_text("utf-8") if args.pad else None,
                 notes=Notes(args.sample, args.operator, args.note, args.conditions),
                 progress=progress.tell,
+                planned_s=preflight.duration_s + preflight.approach_s,
+                left=left,
             )
     except InputError:
         discard(folder)  # no device has been reached: nothing was measured, and the same command may be given again

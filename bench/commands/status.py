@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from bench.daily.words import add_arguments, bench_of, put_out
 from bench.errors import EXIT_DONE, EXIT_NO
@@ -18,9 +19,14 @@ def main(args: argparse.Namespace) -> int:
     bench = bench_of(args)
     from bench.daily import look
     from bench.daily.open_bench import OpenBench
+    from bench.recording.unfinished import left_behind, notice
+    from bench.run.folder import RUNS
 
+    left = left_behind(Path(RUNS), bench.name) if not bench.all_simulated else None
     with OpenBench(bench) as work:
         found = look.status(work)
+    if left is not None:
+        found.remarks.append(notice(left))
     figures = {
         "bench": bench.name,
         "motor": found.motor,

@@ -48,7 +48,7 @@ def home(work: OpenBench, *, again: bool = False) -> dict[str, Any]:
         if homed is None and again:
             loop.axis.go_silent()
             yield from loop.perform(motor.home())
-            yield from run._enter_travel()
+            yield from run.enter_travel()
 
     work.move(whole, may_home=True)
     homed = work.notebook.data_of("homed")

@@ -20,7 +20,8 @@ from bench.run.axis import Axis
 from bench.run.loop import Loop, Script
 from bench.run.motion import Mover, Shape
 from bench.run.rig import open_rig
-from bench.run.safety import Envelope, Monitor
+from bench.run.runner import envelope_of
+from bench.run.safety import Monitor
 from bench.run.script import Run
 from bench.run.signals import Operator, listening
 from bench.run.touchoff import warm_up
@@ -49,22 +50,14 @@ class OpenBench:
             raise InputError(bench.place((error.device, "port")), f"{error.device}: {error.message}") from error
         warm_up()
         limits = bench.limits
-        envelope = Envelope(
-            force_N=limits.force,
-            tension_N=limits.tension,
-            gross_N=bench.load_cell.capacity,
-            position_mm=limits.position,
-            speed_mm_s=limits.speed,
-            following_error_mm=limits.following_error,
-            stale_s=limits.stale,
-            moving_mass_kg=bench.motor.moving_mass,
-        )
         self.notebook = Notebook()
         self.operator = Operator()
         self.axis = Axis(self.rig.motor, 1.0 / motor_rate_Hz(bench))
-        self.loop = Loop(self.rig, self.axis, Monitor(envelope), self.notebook, self.operator)
         protocol = _standing(bench)
-        self.run = Run(self.loop, protocol, bench, plan(protocol, bench))
+        planned = plan(protocol, bench)
+        monitor = Monitor(envelope_of(bench, planned))
+        self.loop = Loop(self.rig, self.axis, monitor, self.notebook, self.operator)
+        self.run = Run(self.loop, protocol, bench, planned)
         self.mover = Mover(self.loop, Shape(min(GENTLE_MM_S2, limits.acceleration)))
         self.clock = self.rig.clock
 

@@ -20,6 +20,7 @@ from bench.daily.series_state import PadState, State, Turn
 from bench.errors import InputError
 from bench.preflight import Preflight
 from bench.protocol import Protocol
+from bench.recording.unfinished import left_behind, notice
 from bench.run.folder import discard
 from bench.run.runner import Notes, Outcome, run_protocol
 
@@ -134,6 +135,9 @@ def _turn(
     if bench.all_simulated and bench.simulation is not None:  # another pad: another surface, other noise
         simulation = bench.simulation.model_copy(update={"seed": bench.simulation.seed + number - 1})
         bench = bench.model_copy(update={"simulation": simulation})
+    left = left_behind(series.out, bench.name) if not bench.all_simulated else None
+    if left is not None:
+        person.say(notice(left))
     rested = f"left alone for {rested_s:.0f} s" if rested_s is not None else "simulated: never touched before"
     note = "; ".join([*([pad.note] if pad.note else []), f"{rested}; pad {number} of series {series.name}"])
     where = series.out / folder
@@ -146,8 +150,10 @@ def _turn(
                 preflight.plan,
                 where,
                 believed_text=series.believed_text,
-                notes=Notes(pad.id, series.operator, note, series.conditions),
+                notes=Notes(pad.id, series.operator, note, series.conditions, rested_s),
                 progress=progress.tell,
+                planned_s=preflight.duration_s + preflight.approach_s,
+                left=left,
             )
     except InputError:
         discard(where)

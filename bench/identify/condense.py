@@ -12,24 +12,27 @@ from .problem import Problem, Run
 
 TARGET = 6000  # samples left, at most about
 SHORT = 1500  # samples that need no stand-in
+GROWTH = 0.06  # length of a block in a hold, of the time since the hold began
+BLOCKS = 6.0  # times 1/GROWTH, blocks in a hold, about
 
 
-def condensed(problem: Problem, target: int = TARGET) -> tuple[Problem, list[NDArray[np.intp]]]:
+def condensed(problem: Problem, target: int = TARGET, growth: float = GROWTH) -> tuple[Problem, list[NDArray[np.intp]]]:
     """Block means that keep what the model feels: (the shorter problem, of each run the block of every sample).
 
     In a hold the blocks grow with the time since its start, as relaxation slows down; in motion they are of equal
     length. A block weighs as many samples as it stands for. Data that are short already come back as they are.
+    `growth`: length of a block in a hold, of the time since it began (more where there are too many holds).
     """
     moving, blocks_of_holds = 0, 0
     still = [holds(run.time_s, run.u) for run in problem.runs]
     for run, stretches in zip(problem.runs, still, strict=True):
         held = sum(s.stop - s.start for s in stretches)
         moving += run.size - held
-        blocks_of_holds += sum(min(100, s.stop - s.start) for s in stretches)
+        blocks_of_holds += sum(min(int(BLOCKS / growth), s.stop - s.start) for s in stretches)
     if problem.size <= SHORT:
         return problem, [np.arange(run.size) for run in problem.runs]
     length = max(1, int(np.ceil(moving / max(target - blocks_of_holds, target // 3))))
-    growth = 0.06 if blocks_of_holds < target else 0.06 * blocks_of_holds / target
+    growth *= max(1.0, blocks_of_holds / target)
     runs: list[Run] = []
     owners: list[NDArray[np.intp]] = []
     for run, stretches in zip(problem.runs, still, strict=True):

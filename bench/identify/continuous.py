@@ -68,6 +68,8 @@ def fit(
     loose = not_told(problem, best, relative, spread.samples) if best.physical else set()
     loose |= set(undetermined)
     loose |= {"nu" + name[1:] for name in loose if name.startswith("c_")}  # a share that may be nothing has no rate
+    about = notes.findings(problem, noise, best.structure.unilateral)
+    loose |= about.lost(found)
     undetermined = [name for name in found if name in loose]
     traces = traces_of(problem, best)
     samples, V, fit_percent = figures_of(traces)
@@ -95,7 +97,7 @@ def fit(
         degree=structure.family.degree if structure.family.name == "polynomial" else None,
         traces=traces,
         evidence=_evidence(choice, unit, within),
-        notes=notes.about_data(problem, noise, structure.unilateral) + notes.about_fit(problem, best),
+        notes=about.notes + notes.about_fit(problem, best),
         noise=noise,
         independent_samples=spread.samples,
         covariance=covariance,

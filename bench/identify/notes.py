@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from bench.recording.types import Measurement
@@ -15,19 +18,42 @@ from .past import begins_loaded
 from .problem import Problem
 from .surface import moved_mm
 
+LAW, SHARES, RATES = "law", "shares", "rates"
+
+
+@dataclass
+class Findings:
+    """Sentences about the data, and which kinds of numbers are none of the pad's for what they say."""
+
+    notes: list[str] = field(default_factory=list)
+    spoilt: set[str] = field(default_factory=set)
+
+    def lost(self, names: Collection[str]) -> set[str]:
+        """Those of a fit's numbers that are spoilt."""
+        kinds = {name: {"c": SHARES, "nu": RATES}.get(name.partition("_")[0], LAW) for name in names}
+        return {name for name, kind in kinds.items() if kind in self.spoilt}
+
 
 def about_data(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = True) -> list[str]:
+    """The notes of `findings`."""
+    return findings(problem, noise, unilateral, pasts).notes
+
+
+def findings(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = True) -> Findings:
     """What is wrong or missing in the data themselves, and which numbers that costs.
 
     `unilateral`: a pad that lets go shows no force in air. `pasts`: the method fits the state of a run that begins
     loaded; the others take it as at rest.
     """
-    out = list(problem.notes)
+    every = Findings(list(problem.notes))
+    out = every.notes
     several = len(problem.measurements) > 1
     measurements = [glanced(m) for m in problem.measurements]
     for m in measurements:
-        found = [*m.notes, *_about(m, noise, unilateral, pasts)]
+        mine = _about(m, noise, unilateral, pasts)
+        found = [*m.notes, *mine.notes]
         out += [f"{m.name}: {line}" for line in found] if several else found
+        every.spoilt |= mine.spoilt
     speeds = np.concatenate([_move_speeds(m, problem.depth_mm) for m in measurements])
     if len(speeds) and speeds.max() < 1.5 * speeds.min():
         out.append(
@@ -40,11 +66,13 @@ def about_data(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = T
             "The depth is less than ten times the noise of the position: the elastic law cannot be told, and its"
             " numbers are none of the pad's."
         )
-    return out
+        every.spoilt.add(LAW)
+    return every
 
 
-def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> list[str]:
-    out = []
+def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findings:
+    every = Findings()
+    out = every.notes
     force, depth = m.force_N, np.interp(m.force_time_s, m.position_time_s, m.position_mm)
     top = float(np.abs(force).max())
     deepest = depth > 0.7 * depth.max()
@@ -60,13 +88,16 @@ def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> list[
             f"The force stands at {level:.4g} N again and again, with nothing above: the channel is saturated there."
             " This costs the law at depth and all shares and rates: the cut-off peaks look like a pad that gives way."
         )
+        every.spoilt |= {LAW, SHARES, RATES}
     stuck = _stuck(force, depth, noise, level)
     if stuck:
         out.append(
             f"The force stands still to its last digit for {stuck} samples where its noise should show: drop-outs that"
             " repeat the last value. This costs the quick rates first."
         )
-    out += [line for line in [clocks_note(m, noise)] if line]
+    if line := clocks_note(m, noise):
+        out.append(line)
+        every.spoilt |= {LAW, RATES}
     loaded = begins_loaded(m, float(depth.max()), top, noise)
     out += _level_notes(m, depth, noise, top, unilateral, loaded, pasts)
     if not loaded and deepest.any() and float(depth.max()) > 0:
@@ -77,7 +108,7 @@ def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> list[
                 f"The force rises only from {depth[rising[0]]:.4g} mm on: the surface may not be at 0 mm,"
                 " where the model has it."
             )
-    return out
+    return every
 
 
 def _first_level(force: Array, depth: Array) -> float:

@@ -157,6 +157,8 @@ def fit(
     least, history = next((criterion, h) for criterion, e, h in judged if e is best)
     spread = spread_of(problem, best)
     found, covariance, undetermined = parameters(problem, best, spread)
+    about = notes.findings(problem, noise, unilateral, pasts=False)
+    lost = about.lost(found) | set(undetermined)
     unit = problem.force_N**2
     traces = _traces(problem, best)
     force = np.concatenate([t.force_N[t.counted] for t in traces])
@@ -175,7 +177,7 @@ def fit(
         fit_percent=100 * (1 - math.sqrt(V * len(force)) / variation) if variation > 0 else 0.0,
         physical=best.physical,
         converged=best.converged,
-        undetermined=undetermined,
+        undetermined=[name for name in found if name in lost],
         held_out_rmse=math.nan,
         samples=len(force),
         seconds=time.perf_counter() - begun,
@@ -197,7 +199,7 @@ def fit(
             for criterion, e, _ in judged
         ],  # fmt: skip
         notes=[
-            *notes.about_data(problem, noise, unilateral, pasts=False),
+            *about.notes,
             "As it would have stood when the run ended; `--method continuous` goes on to the end of the search.",
             *([] if best.converged else ["The numbers were still moving when the data ended."]),
         ],

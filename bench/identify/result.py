@@ -97,6 +97,7 @@ class FitResult:
     traces: list[Trace] = field(default_factory=list)
     evidence: list[Evidence] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    """What the data and the fit cannot tell, and what is wrong with them: whole sentences."""
     noise: Noise | None = None
     independent_samples: float = math.nan
     """How many independent samples the residual is worth (its colour)."""
@@ -167,5 +168,6 @@ class FitResult:
             "held_out_rmse": self.held_out_rmse if math.isfinite(self.held_out_rmse) else None,
             "samples": self.samples,
             "seconds": self.seconds,
+            "notes": list(self.notes),
             **more,
         }

@@ -18,10 +18,11 @@ from .problem import Problem
 from .starts import Bounds, Starter, bounds_of
 from .uncertainty import independent_samples
 
-CONTENDERS = 6  # candidates polished on all the data
+CONTENDERS = 6  # candidates polished before they are compared
 CLEAR = 6.0  # difference of the criterion that decides (some 20 to 1 in odds)
-LARGE = 10_000  # samples beyond which candidates are compared on the stand-in, with a few steps on all the data
-STEPS = 8  # of those: in a narrow valley the first from the stand-in's minimum do not reach the end
+LARGE = 40_000  # samples beyond which candidates are compared on a finer stand-in of about so many blocks
+# The position's noise is better out: sample by sample a law gains where it is soft at the depth of a long hold alone.
+FINE = 0.015  # growth of its blocks in a hold: what they leave out is small against the least difference that counts
 RESOLVED = 1e-5  # of the largest force: no force channel is better, no difference of errors below it means anything
 
 
@@ -70,6 +71,7 @@ def choose(
     model, and `unilateral` is what it is called.
     """
     short, owners = condensed(problem)
+    fine = finer(problem)
     bounds = bounds_of(problem)
     ladders = {True: [Ladder(short, f, True, bounds) for f in families] if True in contacts else [],
                False: [Ladder(short, f, False, bounds) for f in families] if False in contacts else []}  # fmt: skip
@@ -88,43 +90,48 @@ def choose(
     estimates = [e for side in ladders.values() for ladder in side for e in ladder.found if e.structure.order in orders]
     candidates = [Candidate(e, e.cost / problem.weight) for e in estimates]
     lowest = min(candidates, key=lambda c: c.V)
-    refined = _refined(problem, short, lowest.estimate)
+    refined = polish(fine, lowest.estimate)
     independent = independent_samples(problem, refined.x, refined.structure)
+    # Means of blocks leave out the scatter within the blocks, which is the same for whatever is fitted to them.
+    V = objective.cost(problem, refined.structure, refined.x) / problem.weight
+    scatter = V - refined.cost / fine.weight
     candidates = [judged(c, independent) for c in candidates]
     ranked = sorted(candidates, key=lambda c: (not c.eligible, c.criterion))
     finished = []
     for rank, c in enumerate(ranked):
         progress(f"comparing {c.estimate.structure.family.name}, order {c.estimate.structure.order}")
-        finished.append(_finished(c, problem, short, owners, independent, contender=rank < CONTENDERS))
+        finished.append(_finished(c, fine, short, owners if fine is problem else None, independent, scatter, rank))
     best = _pick(finished, exact)
     e = polish(problem, best.estimate)
     ended = judged(replace(best, estimate=e, V=e.cost / problem.weight), independent)
     return Choice(ended, [ended if c is best else c for c in finished], independent)
 
 
-def _refined(problem: Problem, short: Problem, estimate: Estimate) -> Estimate:
-    """Polished on all the data; where they are large, on the stand-in and then a little on all of them."""
-    if problem.size <= LARGE:
-        return polish(problem, estimate)
-    ended = polish(short, estimate)
-    return replace(polish(problem, ended, max_steps=STEPS), converged=ended.converged)
+def finer(problem: Problem) -> Problem:
+    """What candidates are compared on: the data themselves, or a stand-in of some `LARGE` blocks."""
+    return condensed(problem, LARGE, FINE)[0] if problem.size > LARGE else problem
 
 
 def _finished(
     c: Candidate,
-    problem: Problem,
+    fine: Problem,
     short: Problem,
-    owners: list[NDArray[np.intp]],
+    owners: list[NDArray[np.intp]] | None,
     independent: float,
-    contender: bool,
+    scatter: float,
+    rank: int,
 ) -> Candidate:
-    """V and held-out error; a contender is polished first, one far behind is taken as it is."""
-    e = _refined(problem, short, c.estimate) if contender else c.estimate
-    V = (e.cost if contender else objective.cost(problem, e.structure, e.x)) / problem.weight
+    """V and held-out error; a contender is polished first, one far behind is taken as it is.
+
+    `owners`: of each run, the short sample of every one of `fine`; without, left-out blocks are those of `short`.
+    `scatter`: what `fine` leaves out of V.
+    """
+    contender = rank < CONTENDERS
+    e = polish(fine, c.estimate) if contender else c.estimate
+    V = (e.cost if contender else objective.cost(fine, e.structure, e.x)) / fine.weight + scatter
     steps = 25 if contender else 5
-    if problem.size <= LARGE:
-        return judged(Candidate(e, V, held_out_square(short, problem, owners, e, steps)), independent)
-    # Means of blocks leave out the scatter within the blocks, which is the same for whatever predicts them.
+    if owners is not None:
+        return judged(Candidate(e, V, held_out_square(short, fine, owners, e, steps)), independent)
     within = V - objective.cost(short, e.structure, e.x) / short.weight
     alone = [np.arange(run.size) for run in short.runs]
     return judged(Candidate(e, V, held_out_square(short, short, alone, e, steps) + within), independent)

@@ -11,7 +11,7 @@ from .condense import condensed
 from .estimate import polish, search
 from .points import Points, points
 from .problem import Problem
-from .select import CLEAR, Choice, choose, judged
+from .select import CLEAR, Choice, choose, finer, judged
 from .starts import Starter
 from .surface import with_surfaces
 
@@ -48,11 +48,15 @@ def _place(choice: Choice) -> int:
 
 
 def _gains(problem: Problem, choice: Choice, family: Points) -> bool:
-    """Whether a curve through points gains on the best formula at all, on a shortened stand-in."""
-    short, _ = condensed(problem)
+    """Whether a curve through points gains on the best formula at all: on a shortened stand-in, then on a finer one."""
     best = choice.best.estimate
-    formula = polish(short, best, max_steps=8, tolerance=1e-6)
+    short, _ = condensed(problem)
     structure = replace(best.structure, family=with_surfaces(family, problem))
     starts = Starter(short, structure.family, structure.unilateral, best.bounds).first(structure.order, 2)
-    trial = search(short, structure, starts, best.bounds)
-    return choice.independent * float(np.log(max(formula.cost, TINY) / max(trial.cost, TINY))) > CLEARLY
+    trial, formula = search(short, structure, starts, best.bounds), best
+    for on in (short, finer(problem)):
+        formula, trial = (polish(on, e, max_steps=8, tolerance=1e-6) for e in (formula, trial))
+        # The scatter within a stand-in's blocks is noise too: a gain is judged by the cost of all the samples.
+        if choice.independent * (formula.cost - trial.cost) <= CLEARLY * max(best.cost, TINY):
+            return False
+    return True

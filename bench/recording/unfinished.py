@@ -48,6 +48,14 @@ class Left:
         return f"{self.folder}: {self.why}{last}"
 
 
+def notice(left: Left) -> str:
+    """What whoever starts the next run must know, and see to before anything is energised."""
+    return (
+        f"NOTICE: the last run on bench '{left.bench}' was not made safe\n  {left}\n"
+        "  see that the probe is clear of the pad before the motor is energised (`padbench release` lets go of it)"
+    )
+
+
 def left_behind(runs: Path, bench: str | None = None) -> Left | None:
     """What the newest run on real hardware under `runs` left, or None where it ended well (or there is none).
 

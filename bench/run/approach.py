@@ -8,16 +8,17 @@ import numpy as np
 
 from bench.errors import Stopped
 from bench.protocol import Approach
+from bench.run.axis import Axis
 from bench.run.loop import Loop, Script, Window
 from bench.run.motion import Mover
 from bench.run.safety import ZERO_LOST_SHARE
-from bench.run.touchoff import MIN_SAMPLES_IN_CONTACT, Air, Surface, air_of, surface_in_pieces, threshold_N
+from bench.run.touchoff import MIN_SAMPLES_IN_CONTACT, Air, Surface, air_of, surface_in_pieces, threshold_N, unsteady_N
 
 TARE_S = 1.0
 """How long the zero is averaged: 550 samples of 10 mN noise give it to 0.4 mN."""
 
 CHECK_S = 0.2
-"""How long the force is averaged before and after backing off."""
+"""How long the force is averaged before and after backing off, and at the end of a rest between two approaches."""
 
 SLOWER = 8.0
 """The second approach is so many times slower than the first, for as many more samples at the surface."""
@@ -38,10 +39,21 @@ TARE_KEEPS_S = 600.0
 AIR_S = 0.05
 """How long a force below the tare is looked at before it is believed."""
 
+STARTING_S = 0.012
+"""For so long the mass that is set in motion may press on the cell: the servo's blow, which is no touch."""
+
 NOT_WATCHED = "the cell's readings repeat in air for longer than a frozen cell could be told by: give it more decimals"
+
+MOVED_MM, MOVED_SHARE = 0.05, 0.2
+"""A move of so much at least must be seen in the measured positions, as that share of what was commanded."""
 
 MOST_PASSES = 4
 """The slow approach is repeated from further above, twice as long each time, where it began too near or in the pad."""
+
+
+def slow_mm_s(approach: Approach, axis: Axis) -> float:
+    """The speed of the second approach; not below what the motor can be told."""
+    return max(approach.speed / SLOWER, axis.slowest_mm_s)
 
 
 def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float) -> Script[Air]:
@@ -75,13 +87,14 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float) 
             f"the probe already touches something: the force fell by {fall:.3f} N when it backed off "
             f"{backed_mm:.2f} mm (threshold {touch:.3f} N); retract the probe (or lower the pad) and start again"
         )
-    if abs(air.drift_N_s) * TARE_S > max(touch, 5.0 * air.sigma_N):
+    asked_N = approach.force if approach is not None else 0.0
+    if abs(air.drift_N_s) * TARE_S > max(asked_N, min(5.0 * air.sigma_N, unsteady_N(np.array(window.gross_N)))):
         raise Stopped(
             f"the force is not steady in air ({air.drift_N_s:+.3f} N/s): the probe touches something, "
             "or the load cell is still warming up; no zero can be taken"
         )
     loop.tare_N, loop.tared_s = air.mean_N, loop.clock.now()
-    loop.monitor.tared()
+    loop.monitor.tared(air.sigma_N)
     if not loop.monitor.frozen.learned():
         loop.sink.event(loop.clock.now(), "frozen_not_watched", {"message": NOT_WATCHED})
     loop.sink.event(
@@ -112,13 +125,14 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
     window = mover.watch()
     found = yield from mover.go_until(deepest, approach.speed, _above(loop, limit))
     mover.unwatch()
+    _must_have_moved(loop, window, start, mover.here())
     if not found:
         raise Stopped(
             f"no contact: the probe went from {start:.2f} to {deepest:.2f} mm and felt less than {limit:.3f} N; "
             "is the pad in place, and limits.position deep enough?"
         )
-    felt = mover.here()
-    if felt - start < min(0.05, 0.5 * approach.retract):
+    felt, felt_N = mover.here(), max(window.net_N)
+    if felt - start < min(max(0.05, 2.0 * STARTING_S * approach.speed), 0.5 * approach.retract):
         raise Stopped(
             f"contact after only {felt - start:.3f} mm of approach: the probe stood on the pad when it was tared; "
             "retract the probe (or lower the pad) and start again"
@@ -129,19 +143,24 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
     rest_s = RECOVER_S
     for _ in range(MOST_PASSES):
         _fresh_tare(loop)
-        yield from mover.go(begin, approach.speed)
-        yield from loop.sleep(rest_s)
-        surface = yield from _slow_approach(loop, mover, approach, air, felt, position_sigma_mm)
+        here_N = yield from _rest_at(loop, mover, begin, approach.speed, rest_s)
+        if here_N > limit and begin > start:
+            begin = start
+            here_N = yield from _rest_at(loop, mover, begin, approach.speed, rest_s)
+        if here_N > limit:
+            raise Stopped(
+                f"the load cell reads {here_N:.3f} N at {begin:.3f} mm, where it was tared: its zero has moved "
+                "since, or the pad has followed the probe"
+            )
+        last = mover.watch()
+        surface = yield from _slow_approach(loop, mover, last, approach, air, felt, position_sigma_mm)
         reached = mover.here()
         if begin <= start or (surface is not None and _enough_air(surface, begin, reached)):
             break
-        rest_s = max(RECOVER_S, RECOVER_TIMES * (reached - begin) * SLOWER / approach.speed)
+        rest_s = max(RECOVER_S, RECOVER_TIMES * (reached - begin) / slow_mm_s(approach, mover.axis))
         begin = max(start, begin - max(BEFORE_MM, reached - begin))
     if surface is None:
-        raise Stopped(
-            f"the surface could not be measured: fewer than {MIN_SAMPLES_IN_CONTACT} samples of the slow approach "
-            f"({approach.speed / SLOWER:g} mm/s) were in contact; approach slower"
-        )
+        raise Stopped(_why_no_surface(last, felt, felt_N, limit, slow_mm_s(approach, mover.axis)))
     loop.sink.event(
         loop.clock.now(),
         "touch_off",
@@ -157,18 +176,64 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
     return surface
 
 
+def _rest_at(loop: Loop, mover: Mover, position_mm: float, speed_mm_s: float, rest_s: float) -> Script[float]:
+    """Go there and rest; the mean net force at the end of the rest, N."""
+    yield from mover.go(position_mm, speed_mm_s)
+    yield from loop.sleep(rest_s - CHECK_S)
+    return (yield from _average(loop, CHECK_S)) - loop.tare_N
+
+
 def _slow_approach(
-    loop: Loop, mover: Mover, approach: Approach, air: Air, felt_mm: float, position_sigma_mm: float
+    loop: Loop, mover: Mover, window: Window, approach: Approach, air: Air, felt_mm: float, position_sigma_mm: float
 ) -> Script[Surface | None]:
     """From here slowly until the pad is felt a little harder than before; what the samples say of its surface."""
     limit = threshold_N(approach.force, air)
-    window = mover.watch()
+    start = mover.here()
     stop_at = max(2.0 * limit, limit + 5.0 * air.sigma_N)
     end = min(felt_mm + BEYOND_MM, loop.monitor.envelope.deepest_mm)
-    yield from mover.go_until(end, approach.speed / SLOWER, _above(loop, stop_at))
+    yield from mover.go_until(end, slow_mm_s(approach, mover.axis), _above(loop, stop_at))
     yield from loop.sleep(0.02)
     mover.unwatch()
+    _must_have_moved(loop, window, start, mover.here())
     return (yield from _surface_of(window, air, position_sigma_mm))
+
+
+def _must_have_moved(loop: Loop, window: Window, from_mm: float, to_mm: float) -> None:
+    """Positions that stand still while the axis is told to move: the following error is still within its limit."""
+    asked_mm = abs(to_mm - from_mm)
+    if asked_mm < MOVED_MM or not window.position_mm:
+        return
+    seen_mm = max(window.position_mm) - min(window.position_mm)
+    if seen_mm < MOVED_SHARE * asked_mm:
+        loop.monitor.violate(
+            f"the motor's position stands still at {window.position_mm[-1]:.3f} mm, and the axis was told to go from "
+            f"{from_mm:.3f} to {to_mm:.3f} mm: it is held, or the reading is frozen",
+            "motor",
+        )
+        loop.monitor.check()
+
+
+def _why_no_surface(window: Window, felt_mm: float, felt_N: float, limit_N: float, speed_mm_s: float) -> str:
+    """What the last slow approach saw, in words, where no surface comes out of it."""
+    begun_mm, ended_mm = (window.position_mm or [math.nan])[0], max(window.position_mm, default=math.nan)
+    net = np.array(window.net_N or [math.nan])
+    few = max(1, net.size // 10)
+    began_N, ended_N = float(net[:few].mean()), float(net[-few:].mean())
+    seen = (
+        f"the slow approach ({speed_mm_s:g} mm/s) went from {begun_mm:.3f} to {ended_mm:.3f} mm, and the force from "
+        f"{began_N:+.3f} to {ended_N:+.3f} N (the first one had felt {felt_N:.3f} N at {felt_mm:.3f} mm)"
+    )
+    if net.max() < limit_N:
+        why = "no contact where there was one before: the cell's zero or gain has changed, or the pad has moved"
+    elif began_N > limit_N:
+        why = "force where the probe should be in air: the cell's zero has moved since the tare, or the pad follows it"
+    elif ended_mm < felt_mm - BEYOND_MM:
+        why = "it ended far above where the pad was felt: the cell's noise or gain has grown, or its zero drifts"
+    elif ended_N - began_N < 0.5 * limit_N:
+        why = "the force does not rise with the depth: what was felt is no pad (the zero drifts, or noise has grown)"
+    else:
+        why = f"fewer than {MIN_SAMPLES_IN_CONTACT} samples were in contact; approach slower"
+    return f"the surface could not be measured: {why}; {seen}"
 
 
 def _in_air_mm(felt_mm: float, rough: Surface | None, approach: Approach) -> float:
@@ -214,6 +279,7 @@ class _TwoInARow:
         self.before = False
         self.least_N = max(10.0 * limit_N, ZERO_LOST_SHARE * loop.monitor.envelope.force_N)
         self.below_s = math.nan
+        self.from_s = loop.clock.now() + STARTING_S
 
     def __call__(self) -> bool:
         """Asked once for every force sample."""
@@ -228,7 +294,7 @@ class _TwoInARow:
                 f"the force fell to {net_N:.3f} N on the way to the pad: the zero has moved since the tare, or the "
                 "cell's sign is wrong (load_cell.sign)"
             )
-        now = self.loop.last_net_N >= self.limit_N
+        now = net_N >= self.limit_N and now_s > self.from_s
         both = now and self.before
         self.before = now
         return both

@@ -201,6 +201,11 @@ class Axis:
             self._goal_mm = self._segment_end(SEGMENT_S)
             self._begin(self.motor.move(self._goal_mm, speed_mm_s, acceleration_mm_s2))
 
+    @property
+    def slowest_mm_s(self) -> float:
+        """The slowest speed that the motor can be told (mm/s); 0 for one that is streamed."""
+        return self.motor.slowest_mm_s if isinstance(self.motor, RegisterMotor) else 0.0
+
     def stamp_std_s(self) -> float:
         """Doubt of the polls' stamps: a device looks where it is at some time while it works on its reply, and always
         at the same; stamps are in the middle, so that half of that time is not too much for a standard deviation."""

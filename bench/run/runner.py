@@ -21,6 +21,7 @@ from bench.errors import InputError, Stopped
 from bench.plan import Plan
 from bench.protocol import Protocol
 from bench.rates import force_rate_Hz, motor_rate_Hz
+from bench.recording.unfinished import Left
 from bench.recording.writer import Recorder
 from bench.run.axis import Axis
 from bench.run.folder import RECORDING
@@ -48,6 +49,8 @@ class Notes:
     operator: str | None = None
     note: str | None = None
     conditions: str | None = None
+    since_contact_s: float | None = None
+    """For how long the pad had been left alone: since it was mounted, or touched last."""
 
 
 @dataclass(frozen=True)
@@ -76,9 +79,12 @@ def run_protocol(
     believed_text: str | None = None,
     notes: Notes | None = None,
     progress: Progress | None = None,
+    planned_s: float | None = None,
+    left: Left | None = None,
 ) -> Outcome:
     """Run the plan of a protocol on a bench and record it in `folder`.
 
+    `planned_s`: how long it will take, for the room on the disk. `left`: what the run before this one left behind.
     The first thing that goes wrong stops the motor, is recorded and comes back as `Outcome.cause`; the data are kept.
     Raises `InputError` where a port cannot be opened, a device does not answer or the recording cannot be made:
     nothing has been commanded then, and nothing is recorded that is worth keeping.
@@ -94,17 +100,24 @@ def run_protocol(
     with rig, _undisturbed(), listening(operator):  # to the end of the recording: a late signal must not tear it
         virtual = rig.world is not None and not rig.world.clock.wall
         mode: Literal["inline", "process"] = "inline" if virtual else "process"
-        with Recorder(folder / RECORDING, rig.clock, mode=mode) as recorder:
+        force_Hz = force_rate_Hz(bench, protocol.sampling.load_cell)
+        motor_Hz = motor_rate_Hz(bench, protocol.sampling.motor)
+        path, per_s = folder / RECORDING, force_Hz + motor_Hz
+        with Recorder(path, rig.clock, mode=mode, planned_s=planned_s, samples_per_s=per_s) as recorder:
             recorder.begin(
                 _run_record(protocol, bench, notes or Notes()),
                 _host_record(),
                 simulation=rig.world.truth() if rig.world is not None else None,
                 attachments=_attachments(protocol, bench, believed_text),
             )
-            monitor = Monitor(_envelope(bench, plan))
-            monitor.frozen.expect(force_rate_Hz(bench, protocol.sampling.load_cell), bench.limits.stale)
-            rate = motor_rate_Hz(bench, protocol.sampling.motor)
-            loop = Loop(rig, Axis(rig.motor, 1.0 / rate), monitor, recorder, operator)
+            if left is not None:
+                found = {"folder": str(left.folder), "why": left.why, "pressing": left.pressing}
+                seen = {"position_mm": left.position_mm, "force_N": left.force_N, "surface_mm": left.surface_mm}
+                known = {key: value for key, value in seen.items() if value is not None}
+                recorder.event(rig.clock.now(), "left_behind", {**found, **known})
+            monitor = Monitor(envelope_of(bench, plan))
+            monitor.frozen.expect(force_Hz, bench.limits.stale)
+            loop = Loop(rig, Axis(rig.motor, 1.0 / motor_Hz), monitor, recorder, operator)
             if rig.world is not None:
                 from bench.run.simulated import overheard
 
@@ -212,7 +225,8 @@ def _as_sampled(bench: Bench, protocol: Protocol) -> Bench:
     return bench.model_copy(update={"load_cell": bench.load_cell.model_copy(update=update)})
 
 
-def _envelope(bench: Bench, plan: Plan) -> Envelope:
+def envelope_of(bench: Bench, plan: Plan) -> Envelope:
+    """What a run must stay within: the tighter of bench and protocol."""
     limits = bench.limits
     return Envelope(
         force_N=plan.limits.force_N,
@@ -243,6 +257,7 @@ def _run_record(protocol: Protocol, bench: Bench, notes: Notes) -> dict[str, obj
         "operator": notes.operator or "",
         "note": notes.note or "",
         "conditions": notes.conditions or "",
+        **({"since_contact_s": notes.since_contact_s} if notes.since_contact_s is not None else {}),
         "probe": bench.machine.probe.model_dump(exclude_none=True),
         "motor": bench.motor.driver,
         "load_cell": bench.load_cell.driver,

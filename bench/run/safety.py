@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from bench.errors import Stopped
-from bench.run.watch import LEAST_N, SENSE_S, SHARE, FrozenWatch, SenseWatch
+from bench.run.watch import JUMP_OF_LIMIT, LEAST_N, SENSE_S, SHARE, FrozenWatch, JumpWatch, SenseWatch
 from drivers.loadcell import ForceSample
 from drivers.motor import MotorSample
 
@@ -76,6 +76,7 @@ class Monitor:
         self.stopping = False
         self.frozen = FrozenWatch()
         self.sense = SenseWatch(envelope.sense_N)
+        self.jump = JumpWatch(JUMP_OF_LIMIT * envelope.force_N)
         self.cell_lost = False
         """There is no force to go by: silent, frozen, unplugged, contradicted by the motor; first cause or not."""
 
@@ -113,10 +114,14 @@ class Monitor:
         """From now on the motor must keep answering."""
         self._newest_motor_s = now_s
 
-    def tared(self) -> None:
-        """The zero has been taken, in air and at rest: what motor and cell feel from now on is more than that."""
+    def tared(self, sigma_N: float = math.nan) -> None:
+        """The zero has been taken, in air and at rest: what motor and cell feel from now on is more than that.
+
+        `sigma_N`: the noise there; not a number: jumps of the force are not judged (somebody works by hand).
+        """
         self._tared, self._zeroed = True, None
         self.sense.in_air()
+        self.jump.in_air(sigma_N)
 
     def force(self, sample: ForceSample, net_N: float) -> None:
         """Judge one force sample: pad by net force, cell by gross force."""
@@ -148,6 +153,7 @@ class Monitor:
             apart = self.sense.motor(sample.time_s, sample.force_N)
             if apart is not None:
                 self.violate(apart, "cell")
+        self.jump.motor(sample.time_s, command_mm, x)
         if not e.position_mm[0] - SLACK_MM <= x <= e.position_mm[1] + SLACK_MM:
             self.violate(f"travel limit: at {x:.3f} mm, allowed {e.position_mm[0]:g} to {e.position_mm[1]:g} mm")
         if e.surface_mm is not None and x - e.surface_mm > e.depth_mm + SLACK_MM:
@@ -185,6 +191,9 @@ class Monitor:
         if frozen is not None:
             self.violate(frozen, "cell")
         self.sense.cell(sample.time_s, net_N)
+        jumped = self.jump.cell(sample.time_s, net_N)
+        if jumped is not None:
+            self.violate(jumped, "cell")
         zeroed = "zeroed" in sample.flags
         if self._zeroed is None:
             self._zeroed = zeroed

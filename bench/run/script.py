@@ -16,13 +16,13 @@ from bench.plan import Plan, Segment
 from bench.protocol import Approach, Protocol
 from bench.recording.schemas import POLLED
 from bench.recording.types import StepMark
-from bench.run.approach import tare, touch_off
+from bench.run.approach import slow_mm_s, tare, touch_off
 from bench.run.force import hold_force, press
 from bench.run.loop import Loop, Script
 from bench.run.motion import Mover, Shape
 from bench.run.stopping import Stopping
 from bench.run.touchoff import Air, Surface
-from drivers.errors import DriverError
+from drivers.errors import DeviceTimeout, DriverError
 from drivers.motor import MotorLimits, MotorSample
 
 SLOW_MM_S = 5.0
@@ -42,8 +42,17 @@ PUSHED_N = 0.1
 REST_PATIENCE_S = 2.0
 """How long a free axis that moves is waited for before it is energised."""
 
+STARTLED_S, STARTLED_MM = 0.1, 0.25
+"""For so long it is watched as it is energised; it may settle by so much, half the following error at the most."""
+
+STARTLED_SHARE, STARTLED_N = 0.05, 0.5
+"""And the force may change by that share of its limit, or so much."""
+
 LONGEST_EXCHANGE = 200
 """Bytes of the longest request and reply together, about."""
+
+QUIET_S = 0.5
+"""The motor is safe: a load cell that does not end its stream is not waited for any longer."""
 
 WATCHDOG_S = 0.1
 """What a motor with a watchdog of its own is told: no command for so long, and it lets go."""
@@ -128,15 +137,17 @@ class Run:
         if motor.kind == "move":
             polled = {"period_s": loop.axis.period_s, "stamp_std_s": loop.axis.stamp_std_s()}
             loop.sink.event(self.clock.now(), POLLED, polled)
-        yield from self._await_rest()
+        free_mm, free_N = yield from self._await_rest()
         yield from loop.perform(motor.energise())
-        yield from self._go_live()
+        yield from self._go_live(free_mm)
         homed = yield from loop.perform(motor.is_homed())
-        if not homed:
+        if homed:
+            yield from self._stand(free_mm, free_N)
+        else:
             self.label = "homing"
             loop.axis.go_silent()
             yield from loop.perform(motor.home())
-            yield from self._enter_travel()
+            yield from self.enter_travel()
 
     def meet_pad(self, approach: Approach) -> Script[None]:
         """Tare in air, find the surface, go to where step 1 starts."""
@@ -205,18 +216,25 @@ class Run:
         yield from Stopping(self).stop()
 
     def quieten(self) -> Script[None]:
-        """End the load cell's stream; that it does not listen is noted, and harms nobody."""
+        """End the load cell's stream; that it does not listen is noted, harms nobody, and is not waited out."""
         loop, cell = self.loop, self.loop.rig.load_cell
         loop.end_measuring()
+        until_s = self.clock.now() + QUIET_S
         try:
-            yield from loop.perform_on(cell.stop(), cell.link)
+            for _ in loop.perform_on(cell.stop(), cell.link):
+                if self.clock.now() > until_s:
+                    raise DeviceTimeout(cell.name, f"no answer within {QUIET_S:g} s of being asked to be quiet")
+                yield
         except DriverError as error:
             loop.sink.event(self.clock.now(), "load_cell_not_stopped", {"message": str(error)})
 
     # -- inside ------------------------------------------------------------------------------------------------
 
-    def _await_rest(self) -> Script[None]:
-        """A free axis may be moving (a pad pushes it out, a vertical one sinks): it is not caught in flight."""
+    def _await_rest(self) -> Script[tuple[float, float]]:
+        """A free axis may be moving (a pad pushes it out, a vertical one sinks): it is not caught in flight.
+
+        Returns where it rests (mm) and the gross force there (N).
+        """
         loop = self.loop
         give_up = self.clock.now() + REST_PATIENCE_S
         while loop.last_force is None:
@@ -242,6 +260,39 @@ class Run:
                 f"the probe already touches something: the free axis was pushed back by {moved:.2f} mm, and the force "
                 f"fell by {fell:.2f} N; retract the probe (or lower the pad) and start again"
             )
+        return now.position_mm, loop.last_gross_N
+
+    def _stand(self, free_mm: float, free_N: float) -> Script[None]:
+        """An axis that is energised stays where it was. One that moves, or presses, holds another place than it says.
+
+        Raises `Stopped`; the motor is to blame, and is commanded no more.
+        """
+        loop, limits = self.loop, self.loop.monitor.envelope
+        most_N = max(STARTLED_N, STARTLED_SHARE * limits.force_N)
+        until_s, seen, apart = self.clock.now() + STARTLED_S, loop.force_count, 0
+        while self.clock.now() < until_s:
+            if loop.last_motor is not None:
+                self._judge_start(free_mm, loop.last_motor.position_mm)
+            if loop.force_count != seen:
+                seen = loop.force_count
+                rose_N = loop.last_gross_N - free_N
+                apart = apart + 1 if abs(rose_N) > most_N else 0
+                if apart > 1:
+                    loop.monitor.violate(
+                        f"the force changed by {rose_N:+.2f} N as the motor was energised, before any motion: the "
+                        "probe touches something, or the axis moved and does not say so",
+                        "motor",
+                    )
+            loop.monitor.check()
+            yield
+
+    def _judge_start(self, free_mm: float, now_mm: float) -> None:
+        if abs(now_mm - free_mm) > min(STARTLED_MM, 0.5 * self.loop.monitor.envelope.following_error_mm):
+            self.loop.monitor.violate(
+                f"the axis went from {free_mm:.3f} to {now_mm:.3f} mm as the motor was energised, before any motion: "
+                "its reading and what it holds are not the same place",
+                "motor",
+            )
 
     def _force_speed(self, segment: Segment) -> float:
         """The planned speed, less where the opened cell is slower (a filter, an average) than the bench file told."""
@@ -254,10 +305,13 @@ class Run:
         self.loop.sink.event(self.clock.now(), "slower", data)
         return speed
 
-    def _go_live(self) -> Script[None]:
-        """Read where the axis is, and hold it there from now on."""
+    def _go_live(self, free_mm: float | None = None) -> Script[None]:
+        """Read where the axis is, and hold it there from now on; `free_mm` is where it was before, if it stood."""
         loop = self.loop
         sample: MotorSample = yield from loop.perform(_one(self.motor.read()))
+        if free_mm is not None:
+            self._judge_start(free_mm, sample.position_mm)
+            loop.monitor.check()
         if sample.fault:
             names = ", ".join(self.motor.fault_names(sample.fault))
             raise Stopped(f"the motor reports a fault before any motion: {names}")
@@ -265,7 +319,7 @@ class Run:
         loop.axis.go_live(sample.position_mm)
         loop.monitor.expect_motor_from(self.clock.now())
 
-    def _enter_travel(self) -> Script[None]:
+    def enter_travel(self) -> Script[None]:
         """After homing: from the end of the axis to the near end of the travel allowed, slowly.
 
         Before it was homed, nobody knew where the axis stood, and its home may lie outside the limits.
@@ -296,7 +350,7 @@ class Run:
 
     def _position_doubt(self, approach: Approach) -> float:
         """What stamps that are off by half a poll do to the surface, at the speed it is measured with (mm)."""
-        return approach.speed / 8.0 * 0.5 * self.loop.axis.period_s
+        return slow_mm_s(approach, self.loop.axis) * 0.5 * self.loop.axis.period_s
 
     def _motor_frame(self, pad_mm: float) -> float:
         return pad_mm + self.found.surface_mm

@@ -68,6 +68,16 @@ def air_of(time_s: Array, force_N: Array) -> Air:
     )
 
 
+def unsteady_N(force_N: Array) -> float:
+    """So far the force may wander through a tare by noise and digits alone; samples of shape (n,), n >= 8.
+
+    By what it changes from sample to sample, so that a jump or a drift does not count as the noise that excuses it.
+    """
+    steps = np.abs(np.diff(force_N))
+    digit = float(steps[steps > 0].min()) if steps.any() else 0.0
+    return max(SIGMAS * float(steps.mean()) * float(np.sqrt(np.pi)) / 2.0, 2.0 * digit)
+
+
 def threshold_N(asked_N: float, air: Air) -> float:
     """The force that counts as contact: what the protocol asks, but at least five sigma of the air noise."""
     return max(asked_N, SIGMAS * air.sigma_N)
@@ -96,6 +106,8 @@ def surface_in_pieces(
     `position_sigma_mm` (encoder noise, jitter of stamps) adds to the result's standard deviation.
     """
     sigma = max(sigma_N, 1e-12)
+    if not np.ptp(position_mm) > 0.0:
+        return None
     fits: list[_Fit] = []
     for n in EXPONENTS:
         fit = yield from _fit_exponent(position_mm, force_N, sigma, n)

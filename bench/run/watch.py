@@ -1,12 +1,14 @@
-"""Watchdogs over what the devices say: a cell that repeats itself, a motor and a cell that disagree, a host that slept.
+"""Watchdogs over what the devices say: a cell that repeats itself or jumps, a motor that disagrees, a host asleep.
 
 Each keeps a little state, is given the samples one by one, and answers with a cause or with None.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
+from collections import deque
 
 import numpy as np
 
@@ -34,6 +36,21 @@ LEAST_N = 2.0
 
 SHARE = 0.25
 """Motor and cell may differ by that share of the force limit; and a channel that follows by less than that is flat."""
+
+
+JUMP_SIGMAS, JUMP_SHARE, JUMP_OF_LIMIT = 10.0, 0.1, 0.02
+"""A jump is more than so many times the noise in air, that share of the force there, and that of the force limit."""
+
+SIDE, BETWEEN = 6, 2
+SMOOTH = 0.3
+"""Readings to each side of a jump, those it may take, and what each side may spread by, of the jump."""
+
+BACK_SHARE = 0.1
+"""So many of the readings afterwards may be back on the other side: outliers."""
+
+STANDS_S, STAYS_S = 0.15, 0.1
+COMMAND_MM, STILL_MM = 1e-6, 0.015
+"""The axis stands for so long before a force is judged, and so long a jump lasts. An encoder's last digit may turn."""
 
 
 class FrozenWatch:
@@ -165,6 +182,88 @@ class SenseWatch:
 def _weight(dt_s: float) -> float:
     """Share of a new value in a smoothed one; all of it at the first."""
     return 1.0 if math.isnan(dt_s) else -math.expm1(-max(dt_s, 0.0) / SENSE_S)
+
+
+class JumpWatch:
+    """Whether a force jumps, and stays away, while the axis stands: a pad relaxes, it does not jump.
+
+    A cable that moved, a setting that somebody changed, a sign, a zero: all within one or two samples. Judged are six
+    readings before and six after, by their medians, so that outliers do not count. What goes smoothly (relaxation,
+    drift, slow hum) spreads about as far within the six as it goes from the ones to the others. And what has jumped
+    must stay there for 0.1 s and twelve readings: a knock against the bench does not, nor does what swings.
+    """
+
+    def __init__(self, least_N: float) -> None:
+        self.least_N = least_N
+        self._sigma_N = math.nan
+        self._command_mm = self._still_mm = math.nan
+        self._since_s = math.inf
+        self._readings: deque[float] = deque(maxlen=2 * SIDE + BETWEEN)
+        self._jumped: tuple[float, float, float] | None = None
+        self._after = self._back = 0
+
+    def in_air(self, sigma_N: float) -> None:
+        """What the noise is; from now on the force is judged."""
+        self._sigma_N = sigma_N
+
+    def motor(self, time_s: float, command_mm: float, position_mm: float) -> None:
+        """One position, commanded and measured: whether the axis stands, and since when."""
+        if abs(command_mm - self._command_mm) < COMMAND_MM and abs(position_mm - self._still_mm) < STILL_MM:
+            return
+        self._command_mm, self._still_mm = command_mm, position_mm
+        self._begin(time_s)
+
+    def cell(self, time_s: float, net_N: float) -> str | None:
+        """One net force; the cause where it has jumped."""
+        if math.isnan(self._sigma_N) or time_s - self._since_s < STANDS_S:
+            return None
+        readings = self._readings
+        readings.append(net_N)
+        if len(readings) < 2 * SIDE + BETWEEN:
+            return None
+        if self._jumped is None:
+            self._jumped = self._seen(time_s)
+            return None
+        at_s, before_N, jump_N = self._jumped
+        self._after += 1
+        self._back += abs(net_N - before_N) < 0.5 * abs(jump_N)
+        if self._back > max(1.0, BACK_SHARE * self._after):
+            self._begin(time_s)  # it came back, which is no jump either
+            return None
+        if time_s - at_s < STAYS_S or self._after < 2 * SIDE:
+            return None
+        self._jumped = None
+        return (
+            f"the load cell's reading jumped from {before_N:.3f} to {before_N + jump_N:.3f} N while the axis stood "
+            "still, which no pad does: a cable, a setting, the sign or the zero of the cell has changed"
+        )
+
+    def _begin(self, time_s: float) -> None:
+        """Look anew, some time from now on."""
+        self._since_s = time_s
+        self._readings.clear()
+        self._jumped = None
+
+    def _seen(self, time_s: float) -> tuple[float, float, float] | None:
+        """When, from what, by how much: where the readings now at hand have a jump in their middle."""
+        readings = self._readings
+        if abs(readings[-1] - readings[0]) <= self._most(readings[0]):
+            return None
+        before, after = (
+            sorted(itertools.islice(readings, SIDE)),
+            sorted(itertools.islice(readings, SIDE + BETWEEN, None)),
+        )
+        before_N, after_N = (0.5 * (side[SIDE // 2 - 1] + side[SIDE // 2]) for side in (before, after))
+        jump_N = after_N - before_N
+        # One of the six may be an outlier.
+        spread_N = max(min(side[-2] - side[0], side[-1] - side[1]) for side in (before, after))
+        if abs(jump_N) <= self._most(before_N) or spread_N > SMOOTH * abs(jump_N):
+            return None
+        self._after = self._back = 0
+        return time_s, before_N, jump_N
+
+    def _most(self, force_N: float) -> float:
+        return max(JUMP_SIGMAS * self._sigma_N, JUMP_SHARE * abs(force_N), self.least_N)
 
 
 class HostSleep:

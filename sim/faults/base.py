@@ -66,7 +66,7 @@ class Reaction:
     `fault` is the entry as it stands in a bench file, without `kind` and `device`. `says`: a regular expression that
     the cause (or the refusal) matches. `shows`: of a run that recovers, the counters that tell of the fault, where
     there are any: those of a line (`motor`), or one of the result (`overruns`). `bench` is the shipped bench, `why` the
-    reason in words. `not_yet`: why a run does not come out of it like this, where it does not.
+    reason in words.
     """
 
     device: Device
@@ -75,7 +75,6 @@ class Reaction:
     says: str = ""
     shows: str = ""
     why: str = ""
-    not_yet: str = ""
     bench: str = "simulated"
 
 

@@ -8,6 +8,11 @@ from sim.faults.base import RECOVERED, STOPPED, Fault, Kind, Parameter, Reaction
 from sim.faults.bytes_ import IN_HOLD, IN_RAMP
 from sim.faults.site import Site
 
+LOST = "surface could not be measured: (no contact where|force where|it ended far above|the force does not rise)"
+"""The slow approach does not find what the first one felt."""
+
+MOVED = "where it was tared: its zero has moved"
+
 Distortion = Callable[[float, float], float]
 """(true reading in N, time) → what the device takes for it."""
 
@@ -161,7 +166,13 @@ KINDS: tuple[Kind, ...] = (
                 STOPPED,
                 "(?i)jump|load cell|tare|motor",
                 why="below every limit, but no pad does that while the axis stands",
-                not_yet="a jump below every limit is not judged",
+            ),
+            Reaction(
+                "load_cell",
+                {"step": "approach", "after_s": 0.1, "by_N": 0.5},
+                STOPPED,
+                MOVED,
+                why="it looks like a touch, and stays where the tare was taken",
             ),
             Reaction(
                 "load_cell", {"at_s": 1.0, "by_N": 0.5}, STOPPED, "(?i)steady|touches|jump", why="while it is tared"
@@ -190,6 +201,13 @@ KINDS: tuple[Kind, ...] = (
             Reaction("load_cell", {"at_s": 0, "rate_N_s": 0.5}, STOPPED, "not steady in air"),
             Reaction("load_cell", {"at_s": 0, "rate_N_s": 0.005}, RECOVERED, why="as much as a fit takes up"),
             Reaction("load_cell", {**IN_HOLD, "rate_N_s": 200.0}, STOPPED, "force limit"),
+            Reaction(
+                "load_cell",
+                {"step": "approach", "after_s": 0.1, "rate_N_s": 0.5},
+                STOPPED,
+                MOVED,
+                why="it looks like a touch, and is there in air too",
+            ),
         ),
         (Parameter("rate_N_s", "N/s", 0.1, "how fast", -1e6, 1e6),),
     ),
@@ -211,9 +229,15 @@ KINDS: tuple[Kind, ...] = (
                 {**IN_HOLD, "factor": -1.0},
                 STOPPED,
                 "(?i)jump|tension|sign|load cell",
-                not_yet="a jump below every limit is not judged",
             ),
             Reaction("load_cell", {**IN_HOLD, "factor": 20.0}, STOPPED, "force limit|overload"),
+            Reaction(
+                "load_cell",
+                {"step": "approach", "after_s": 0.4, "factor": -1.0},
+                STOPPED,
+                LOST,
+                why="between the two approaches: the second one feels nothing where the first one did",
+            ),
             Reaction("load_cell", {"at_s": 0, "factor": 0.0}, STOPPED, "(?i)froz|no contact|motor|still"),
         ),
         (Parameter("factor", "", -1.0, "the factor", -1e6, 1e6),),

@@ -8,6 +8,11 @@ from sim.faults.base import RECOVERED, STOPPED, Fault, Kind, Parameter, Reaction
 from sim.faults.bytes_ import IN_HOLD, IN_RAMP
 from sim.faults.site import Site
 
+IN_HOMING = {"at_s": 1.0}
+"""The controllers that home begin with it at once, and are on their way then."""
+
+STUCK = "home return does not end: its position has stood still"
+
 
 def _stall(fault: Fault, site: Site) -> None:
     plant = site.plant
@@ -155,6 +160,7 @@ KINDS: tuple[Kind, ...] = (
             Reaction("motor", {**IN_HOLD}, STOPPED, "following error"),
             Reaction("motor", {"step": "approach", "after_s": 0.05}, STOPPED, "following error"),
             Reaction("motor", {**IN_RAMP}, STOPPED, "following error", bench="simulated_iai"),
+            Reaction("motor", {**IN_HOMING}, STOPPED, STUCK, bench="simulated_iai", why="while it homes"),
         ),
     ),
     Kind(
@@ -165,6 +171,9 @@ KINDS: tuple[Kind, ...] = (
         (
             Reaction("motor", {**IN_RAMP, "left_N": 0.5}, STOPPED, "following error|fault"),
             Reaction("motor", {"at_s": 0, "left_N": 60.0}, RECOVERED, why="it is still strong enough"),
+            Reaction(
+                "motor", {**IN_HOMING, "left_N": 0.1}, STOPPED, STUCK, bench="simulated_iai", why="while it homes"
+            ),
         ),
         (
             Parameter("left_N", "N", 1.0, "what is left", 0.0, 1e6),
@@ -178,8 +187,14 @@ KINDS: tuple[Kind, ...] = (
         _jam,
         (
             Reaction("motor", {**IN_RAMP}, STOPPED, "following error|motor reports a fault: force limit"),
-            Reaction("motor", {"step": "approach"}, STOPPED, "following error|motor reports a fault: force limit"),
+            Reaction(
+                "motor",
+                {"step": "approach"},
+                STOPPED,
+                "following error|motor reports a fault: force limit|the motor pushes|position stands still",
+            ),
             Reaction("motor", {**IN_RAMP}, STOPPED, "following error", bench="simulated_iai"),
+            Reaction("motor", {**IN_HOMING}, STOPPED, STUCK, bench="simulated_iai", why="while it homes"),
             Reaction("motor", {**IN_HOLD, "duration_s": 0.1}, RECOVERED, why="it was to stand there anyway"),
         ),
     ),
@@ -217,6 +232,14 @@ KINDS: tuple[Kind, ...] = (
             Reaction("motor", {**IN_RAMP, "code": 1024}, STOPPED, "motor reports a fault.*volt"),
             Reaction("motor", {**IN_RAMP, "code": 256}, STOPPED, "motor reports a fault.*power"),
             Reaction("motor", {**IN_RAMP, "code": 0xD8}, STOPPED, "motor reports a fault", bench="simulated_iai"),
+            Reaction(
+                "motor",
+                {**IN_HOMING, "code": 0xD8},
+                STOPPED,
+                "home return.*code 0x00d8",
+                bench="simulated_iai",
+                why="while it homes: its alarm ends the waiting",
+            ),
             Reaction("motor", {**IN_HOLD, "code": 1024, "duration_s": 0.02}, STOPPED, "motor reports a fault.*volt"),
             Reaction("motor", {"at_s": 0, "code": 64}, RECOVERED, why="what sleep mode clears was of before the run"),
         ),
@@ -231,6 +254,7 @@ KINDS: tuple[Kind, ...] = (
             Reaction("motor", {**IN_RAMP}, STOPPED, "following error"),
             Reaction("motor", {**IN_HOLD}, STOPPED, "(?i)following error|froz|same|still"),
             Reaction("motor", {"step": "approach", "after_s": 0.05}, STOPPED, "(?i)following error|froz|same|still"),
+            Reaction("motor", {"step": "approach", "after_s": 0.6}, STOPPED, "position stands still"),
             Reaction("motor", {**IN_RAMP}, STOPPED, "(?i)following error|froz", bench="simulated_iai"),
         ),
     ),
@@ -242,6 +266,13 @@ KINDS: tuple[Kind, ...] = (
         (
             Reaction("motor", {**IN_HOLD, "by_mm": 1.0}, STOPPED, "following error|depth limit"),
             Reaction("motor", {**IN_HOLD, "by_mm": 50.0}, STOPPED, "travel limit"),
+            Reaction(
+                "motor",
+                {"at_s": 0, "by_mm": 0.4},
+                STOPPED,
+                "as the motor was energised",
+                why="it holds what it reads, and goes there at once",
+            ),
         ),
         (Parameter("by_mm", "mm", 1.0, "by how much", -1e3, 1e3),),
     ),

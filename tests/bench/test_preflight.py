@@ -52,6 +52,10 @@ def refusal(found: Preflight) -> str:
 @pytest.mark.parametrize("name", shipped_names("protocol"))
 def test_shipped_protocols_are_clean_on_both_pads(name: str, pad: str, bench_name: str) -> None:
     found = check(load_protocol(name), load_bench(bench_name), load_model(pad))
+    if (name, bench_name) == ("first_contact", "simulated_smc_lec"):  # steps of 0.2 mm/s and less, in whole mm/s
+        refusal = found.refusal()
+        assert refusal is not None and "its slowest is 1 mm/s" in str(refusal)
+        return
     assert found.refusal() is None
     assert found.ok
     if name != "air":

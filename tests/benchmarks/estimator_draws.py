@@ -166,6 +166,17 @@ def flagged(rows: Sequence[Outcome], low: float, high: float) -> tuple[int, int,
     return sum(row.undetermined for row in some), len(some), float(np.mean(at_best)) if some else math.nan
 
 
+def far_off(rows: Sequence[Outcome], low: float, high: float) -> tuple[str, str]:
+    """Of the parameters whose bound is in this range: how many are off by more than half of their value, of those
+    called undetermined, and of the others."""
+    some = [row for row in rows if row.name and low <= row.relative_bound < high]
+    shares = []
+    for called in (True, False):
+        group = [abs(row.over_bound) * row.relative_bound > 0.5 for row in some if row.undetermined == called]
+        shares.append(f"{sum(group)} of {len(group)}")
+    return shares[0], shares[1]
+
+
 def violations(rows: Sequence[Outcome]) -> tuple[int, int, float]:
     """Fits whose V is above that of the truth, all fits, and the largest excess."""
     excess = [row.excess for row in rows if not row.name]

@@ -44,12 +44,12 @@ class Drawn:
 
 
 def reactions(base: str) -> list[tuple[str, Reaction]]:
-    """What may strike on a bench: the rows of the table for it, but those that are known to go wrong."""
+    """What may strike on a bench: the rows of the table for it."""
     return [
         (kind.name, reaction)
         for kind in KINDS.values()
         for reaction in kind.reactions
-        if reaction.bench == base and not reaction.not_yet
+        if reaction.bench == base
     ]
 
 
@@ -80,12 +80,10 @@ def _when(random: np.random.Generator, kind: str, reaction: Reaction) -> dict[st
     way = random.random()
     if way < 0.1 and kind not in NOT_BEFORE:
         return {"at_s": 0.0}
-    if way < 0.4 and kind != "motor_fault":
+    if way < 0.4:
         step = ("approach", "steps[0]", "steps[1]", "tare")[int(random.integers(4))]
         return {"step": step, "after_s": round(float(random.exponential(0.1)), 4)}
-    # An alarm while a controller homes is waited out for two minutes: known, and too slow to see again and again.
-    first_s = 3.5 if kind == "motor_fault" and reaction.bench == "simulated_iai" else 0.0
-    return {"at_s": round(float(random.uniform(first_s, first_s + ABOUT_s)), 4)}
+    return {"at_s": round(float(random.uniform(0.0, ABOUT_s)), 4)}
 
 
 def _protocol(random: np.random.Generator) -> Protocol:

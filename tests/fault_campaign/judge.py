@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import tempfile
-import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,21 +18,6 @@ from tests.faults.test_kinds import LOST_AT_MOST_s
 
 SHIFTS = ("lost_position", "foreign_commands", "position_jump")
 """Faults after which the axis is not where it says: `by_mm` is how far they take it by themselves."""
-
-VAGUE = {
-    "no line within": ("unplugged",),  # a cell that is pulled out while it starts is waited for
-    "home return does not end": (
-        "motor_fault",
-        "jam",
-        "stall",
-        "derating",
-        "hits_end",
-        "position_frozen",
-        "lost_position",
-    ),
-    "surface could not be measured": ("position_frozen", "force_drift", "force_gain", "force_jump", "force_noise"),
-}
-"""What a run says that is true and could say more, and of which faults."""
 
 BLIND = ("force_gain", "force_saturated", "force_frozen", "force_jump", "force_drift", "setting_changes", "zero_key")
 """Faults after which the cell says less than there is: travel and depth still hold, the force limit is deceived."""
@@ -57,10 +41,7 @@ def judge(seed: int) -> Verdict:
     with same_host, tempfile.TemporaryDirectory(prefix="padbench-") as folder:
         made = bench_with(drawn.faults, drawn.base, seed=seed, surface=drawn.surface_mm)
         try:
-            with warnings.catch_warnings():
-                # A touch-off of positions that all are the same divides by their span; it says then that it failed.
-                warnings.filterwarnings("ignore", "invalid value encountered in divide", RuntimeWarning)
-                seen = press(Path(folder), made, drawn.protocol)
+            seen = press(Path(folder), made, drawn.protocol)
         except Exception as error:  # a defect, whatever it is: that is what is looked for
             return Verdict(seed, "crashed", str(error), [f"crashed: {type(error).__name__}: {error}"])
         verdict = Verdict(seed, seen.how, seen.cause, [*safe(seen, drawn), *named(seen), *kept(seen)])
@@ -109,7 +90,6 @@ def named(seen: Seen) -> list[str]:
     if not struck:
         return [f"stopped although nothing had struck: {seen.cause}"]
     told = [r.says for name in struck for r in KINDS[name].reactions if r.says]
-    told += [says for says, names in VAGUE.items() if struck & set(names)]
     if not any(re.search(says, seen.cause) for says in told):
         return [f"the cause names none of {', '.join(sorted(struck))}: {seen.cause}"]
     return []

@@ -19,9 +19,7 @@ def cases() -> Iterator[object]:
     for kind in KINDS.values():
         for number, reaction in enumerate(kind.reactions):
             name = f"{kind.name}-{reaction.device}-{number}"
-            not_yet = reaction.not_yet
-            marks = [pytest.mark.xfail(strict=False, reason=not_yet)] if not_yet else []
-            yield pytest.param(kind, reaction, id=name, marks=marks)
+            yield pytest.param(kind, reaction, id=name)
 
 
 @pytest.mark.parametrize(("kind", "reaction"), list(cases()))

@@ -137,15 +137,15 @@ CASES = {
     "saturated": (
         saturated,
         "the channel is saturated there. This costs the law at depth and all shares and rates",
-        (),
+        ("m", "b", "c_1", "c_2", "nu_1", "nu_2"),
     ),
-    "shallow": (shallow, "the elastic law cannot be told", ("nu_1", "nu_2")),
+    "shallow": (shallow, "the elastic law cannot be told", ("m", "b", "nu_1", "nu_2")),
     "one speed": (one_speed, "All moves are at one speed (5 mm/s)", ()),
     "sign": (reversed_sign, "its sign is reversed", ("m", "b", "c_1", "c_2", "nu_1", "nu_2")),
-    "late": (later(0.02), "The force comes 20 ms later than the motion", ()),
-    "early": (later(-0.02), "The force comes 20 ms earlier than the motion", ()),
-    "far apart": (later(0.3), "The force comes 300 ms later than the motion", ()),
-    "drifting": (drifting, "The clocks of force and position drift apart", ()),
+    "late": (later(0.02), "The force comes 20 ms later than the motion", ("m", "b", "nu_1", "nu_2")),
+    "early": (later(-0.02), "The force comes 20 ms earlier than the motion", ("m", "b", "nu_1", "nu_2")),
+    "far apart": (later(0.3), "The force comes 300 ms later than the motion", ("m", "b", "nu_1", "nu_2")),
+    "drifting": (drifting, "The clocks of force and position drift apart", ("m", "b", "nu_1", "nu_2")),
     "zeros": (zeros, "isolated drop-outs", ()),
     "repeats": (repeats, "drop-outs that repeat the last value. This costs the quick rates first", ()),
     "gaps": (gaps, "3 gaps in the samples", ()),
@@ -163,6 +163,7 @@ def test_the_fit_says_what_is_wrong_and_what_it_costs(name, tmp_path, capsys):
         assert said in text and text.count(said) <= (2 if name in ("gaps", "zeros") else 1)
         found = json.loads(out.read_text())
         assert set(lost) <= set(found["undetermined"])
+        assert said in " ".join(found["notes"])
 
 
 def of_data(made: Rows) -> list[str]:

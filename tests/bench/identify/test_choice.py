@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from bench.identify import fit
+from bench.identify.select import LARGE
 from tests.truth.laws import Exponential, Polynomial, Power
-from tests.truth.pad import Pad
+from tests.truth.motion import Path
+from tests.truth.pad import Pad, simulate
 
-from .closed_form import measured
+from .closed_form import measured, measurement
 
 SHARES, RATES = (0.25, 0.15), (4.0, 0.35)
 
@@ -57,6 +59,19 @@ def test_a_pad_that_never_lets_go_is_called_unilateral() -> None:
     data.force_time_s, data.force_N = data.force_time_s[:until], data.force_N[:until]
     result = fit(data, law="exponential", order=2)
     assert result.contact == "unilateral" and {e.contact for e in result.evidence} == {"unilateral"}
+
+
+def test_noise_of_the_position_in_a_long_hold_buys_no_law() -> None:
+    """Sample by sample a law that is soft at the depth of the hold alone lets less of that noise through."""
+    path = Path(-0.5).hold(1).to(1.8, 60).hold(90).to(-0.5, 60).hold(3).to(1.8, 20).hold(4).to(-0.5, 20)
+    motion = path.hold(1).motion()
+    time = np.arange(0, motion.duration_s, 1e-3)
+    rng = np.random.default_rng(0)
+    F = simulate(Pad(Exponential(2.24, 0.69), SHARES, RATES), motion, time, 0.05).force_N
+    F += 0.005 * rng.standard_normal(len(time))
+    depth = motion.position(time) + 0.0015 * rng.standard_normal(len(time))
+    result = fit(measurement(time, depth, F), order=2, contact="unilateral")
+    assert len(time) > LARGE and result.law == "exponential"
 
 
 def test_coloured_residuals_do_not_buy_modes() -> None:

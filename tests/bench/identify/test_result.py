@@ -15,7 +15,7 @@ from .closed_form import measured
 
 KEYS = [
     *("method", "law", "order", "contact", "model", "parameters", "filter", "V", "rmse", "noise_floor", "fit_percent"),
-    *("physical", "converged", "undetermined", "held_out_rmse", "samples", "seconds"),
+    *("physical", "converged", "undetermined", "held_out_rmse", "samples", "seconds", "notes"),
 ]
 
 
@@ -28,6 +28,7 @@ def test_it_holds_just_what_it_must(result) -> None:
     data = json.loads(json.dumps(result.to_json(), allow_nan=False))
     assert list(data) == KEYS
     assert data["method"] == "continuous" and data["filter"] is None
+    assert data["notes"] == result.notes and all(isinstance(line, str) for line in data["notes"])
     assert list(data["parameters"]) == ["m", "b", "c_1", "c_2", "nu_1", "nu_2"]
     assert [p["unit"] for p in data["parameters"].values()] == ["N/mm", "1/mm", "1", "1", "1/s", "1/s"]
     assert all(set(p) == {"value", "unit", "std"} and p["std"] > 0 for p in data["parameters"].values())
