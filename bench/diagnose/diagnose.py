@@ -19,6 +19,7 @@ from .channel import Faults, faults, not_of_the_motion, standing_off
 from .channel_causes import channel_causes, hum_cause
 from .data import Data, Prepared, prepare
 from .held_out import later_square
+from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .refit import Fit, extended, force_at, mean_square, onto, refit
 from .remains import remains
@@ -69,7 +70,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
             break
         fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + needless), base)
         squares, excess = excesses(prepared, fits, floor)
-    whole = _whole(prepared, fits)
+    whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
 
 
@@ -99,11 +100,11 @@ def _floor(prepared: Prepared, final: Fit) -> float:
     return min(prepared.floor_N, float(np.sqrt(left)))
 
 
-def _whole(prepared: Prepared, fits: list[Fit]) -> tuple[Fit, Fit]:
+def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fit, Fit]:
     """First and last fit carried to the end on all the data, with the hum that the last one then has to make."""
     raw = prepared.raw
     before = onto(fits[0], prepared.full, 6, 1e-8)
-    last = fits[-1]
+    last = replace(fits[-1], x=missing_told(fits[-1], believed))
     if prepared.hum is None:
         return before, _spread(raw, onto(last, raw, 6, 1e-8))
     cause = hum_cause(prepared.hum)
