@@ -146,7 +146,10 @@ def _rested(
     clean, std = clean_mm.copy(), std_mm.copy()
     hold = np.zeros(len(clean), dtype=np.intp)
     coarse, reached = _coarse(position_mm) > 0.0, dict[float, int]()
-    still = np.abs(np.diff(clean_mm)) <= max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)))
+    # a coarse scale hops between two levels, and neither says which of them is nearer
+    hop = resolution(position_mm) if coarse else 0.0
+    noise_mm = max(noise_mm, 0.5 * hop)
+    still = np.abs(np.diff(clean_mm)) <= max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)), 0.6 * hop)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8))).reshape(-1, 2)
     for number, (a, b) in enumerate(edges.tolist(), 1):
         inside = position_mm[a + EDGE : b + 1 - EDGE]
