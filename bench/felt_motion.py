@@ -101,7 +101,25 @@ def resolution(values: Array) -> float:
 def position_noise(position_mm: Array) -> float:
     """Standard deviation of the reported position, rounding included, mm."""
     step = resolution(position_mm)
-    return max(jitter(position_mm), 0.0 if step > 0.01 * np.ptp(position_mm) else step / np.sqrt(12.0))
+    if step == 0.0 or step > 0.01 * np.ptp(position_mm):
+        return jitter(position_mm)
+    return max(jitter(position_mm), _hopping(position_mm, step), step / np.sqrt(12.0))
+
+
+def _hopping(position_mm: Array, step_mm: float) -> float:
+    """Scatter about short lines, mm, where the motion passes no more than a step of the scale: where readings stay the
+    same for a while the quietest stretches, which `jitter` goes by, have none."""
+    n = len(position_mm) // 6
+    if n < 4:
+        return 0.0
+    windows = position_mm[: 6 * n].reshape(n, 6)
+    t = np.arange(6) - 2.5
+    slope = windows @ t / (t @ t)
+    slow = np.abs(slope) * 5.0 <= step_mm
+    if np.count_nonzero(slow) < 4:
+        return 0.0
+    off = windows[slow] - windows[slow].mean(axis=1, keepdims=True) - slope[slow][:, None] * t
+    return float(np.sqrt(np.sum(off**2) / (4.0 * np.count_nonzero(slow))))
 
 
 def smoothed(time_s: Array, position_mm: Array) -> tuple[Array, Array]:
