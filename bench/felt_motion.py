@@ -101,7 +101,25 @@ def resolution(values: Array) -> float:
 def position_noise(position_mm: Array) -> float:
     """Standard deviation of the reported position, rounding included, mm."""
     step = resolution(position_mm)
-    return max(jitter(position_mm), 0.0 if step > 0.01 * np.ptp(position_mm) else step / np.sqrt(12.0))
+    if step == 0.0 or step > 0.01 * np.ptp(position_mm):
+        return jitter(position_mm)
+    return max(jitter(position_mm), _hopping(position_mm, step), step / np.sqrt(12.0))
+
+
+def _hopping(position_mm: Array, step_mm: float) -> float:
+    """Scatter about short lines, mm, where the motion passes no more than a step of the scale: where readings stay the
+    same for a while the quietest stretches, which `jitter` goes by, have none."""
+    n = len(position_mm) // 6
+    if n < 4:
+        return 0.0
+    windows = position_mm[: 6 * n].reshape(n, 6)
+    t = np.arange(6) - 2.5
+    slope = windows @ t / (t @ t)
+    slow = np.abs(slope) * 5.0 <= step_mm
+    if np.count_nonzero(slow) < 4:
+        return 0.0
+    off = windows[slow] - windows[slow].mean(axis=1, keepdims=True) - slope[slow][:, None] * t
+    return float(np.sqrt(np.sum(off**2) / (4.0 * np.count_nonzero(slow))))
 
 
 def smoothed(time_s: Array, position_mm: Array) -> tuple[Array, Array]:
@@ -146,7 +164,10 @@ def _rested(
     clean, std = clean_mm.copy(), std_mm.copy()
     hold = np.zeros(len(clean), dtype=np.intp)
     coarse, reached = _coarse(position_mm) > 0.0, dict[float, int]()
-    still = np.abs(np.diff(clean_mm)) <= max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)))
+    # a coarse scale hops between two levels, and neither says which of them is nearer
+    hop = resolution(position_mm) if coarse else 0.0
+    noise_mm = max(noise_mm, 0.5 * hop)
+    still = np.abs(np.diff(clean_mm)) <= max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)), 0.6 * hop)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8))).reshape(-1, 2)
     for number, (a, b) in enumerate(edges.tolist(), 1):
         inside = position_mm[a + EDGE : b + 1 - EDGE]

@@ -116,8 +116,8 @@ def is_rich(data: Data) -> bool:
     return passes >= PASSES
 
 
-def forms(structure: Structure, in_air: bool, reach: Reach) -> list[tuple[Effect, Form]]:
-    """All forms of all effects that may be added to a structure."""
+def forms(structure: Structure, in_air: bool, reach: Reach, also_unsought: bool = False) -> list[tuple[Effect, Form]]:
+    """All forms of all effects that may be added to a structure; `also_unsought`: those too that only refine others."""
     present = {c.id for c in structure.causes}
     out = []
     for effect in all_effects().values():
@@ -129,7 +129,7 @@ def forms(structure: Structure, in_air: bool, reach: Reach) -> list[tuple[Effect
                 continue
             if in_air and not _in_air(form):
                 continue
-            if not form.sought or (form.amend is not None and not _amends(structure, form)):
+            if not (form.sought or also_unsought) or (form.amend is not None and not _amends(structure, form)):
                 continue
             out.append((effect, narrowed(form, reach)))
     return out

@@ -196,7 +196,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
         good=good,
         noise=replace(noise, force_N=sigma_force),
         hum=line,
-        position_noise_mm=motion.noise_mm,
+        position_noise_mm=max(motion.noise_mm, 1.05 * resolution(m.position_mm)),
         sample_s=sample_s,
         doubt_mm=m.surface_std_mm,
         zero_N=m.zero_std_N,

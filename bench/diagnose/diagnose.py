@@ -18,13 +18,15 @@ from sim.pad import Pad
 from .channel import Faults, faults, not_of_the_motion, standing_off
 from .channel_causes import channel_causes, hum_cause
 from .data import Data, Prepared, prepare
+from .held_out import later_square
+from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .refit import Fit, extended, force_at, mean_square, onto, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
 from .search import Path, Search
 from .spread import covariance
-from .verdict import EXPLAINED, chain, excesses, found, ordered
+from .verdict import EXPLAINED, chain, excesses, found, ordered, without
 from .write import model_of
 
 Array = NDArray[np.float64]
@@ -33,6 +35,7 @@ Mask = NDArray[np.bool_]
 TOLD = 0.002  # of the noise power
 LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and a further cause must take of what was
 # held out
+HARM = 1.2  # times the square of the error of what comes later: a cause that makes more of it is none
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 RIVALS = 4  # models of the best single causes that are kept
 
@@ -61,12 +64,26 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     floor = _floor(prepared, final)
     squares, excess = excesses(prepared, fits, floor)
     apart = _flagged_square(prepared, fits[0])
-    while len(fits) > 1 and excess[-2] - excess[-1] <= (LEAST if len(fits) == 2 else FURTHER) * (excess[0] + apart):
-        fits, squares, excess = fits[:-1], squares[:-1], excess[:-1]
-    if len(fits) == 1:
+    while len(fits) > 1:
+        needless = _needless(prepared, fits, excess, apart)
+        if needless is None:
+            break
+        fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + needless), base)
         squares, excess = excesses(prepared, fits, floor)
-    whole = _whole(prepared, fits)
+    whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
+
+
+def _needless(prepared: Prepared, fits: list[Fit], excess: list[float], apart: float) -> int | None:
+    """Number of a cause that is of no use for what was held out, or does harm to what comes later; None: all are."""
+    gains = [a - b for a, b in zip(excess, excess[1:], strict=False)]
+    least = int(np.argmin(gains))
+    if gains[least] <= (LEAST if len(fits) == 2 else FURTHER) * (excess[0] + apart):
+        return least
+    later = [later_square(prepared, fit) for fit in fits]
+    harm = [b - HARM * a - 2.0 * prepared.floor_square_std for a, b in zip(later, later[1:], strict=False)]
+    worst = int(np.argmax(harm))
+    return worst if harm[worst] > 0.0 else None
 
 
 def _flagged_square(prepared: Prepared, fit: Fit) -> float:
@@ -83,11 +100,11 @@ def _floor(prepared: Prepared, final: Fit) -> float:
     return min(prepared.floor_N, float(np.sqrt(left)))
 
 
-def _whole(prepared: Prepared, fits: list[Fit]) -> tuple[Fit, Fit]:
+def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fit, Fit]:
     """First and last fit carried to the end on all the data, with the hum that the last one then has to make."""
     raw = prepared.raw
     before = onto(fits[0], prepared.full, 6, 1e-8)
-    last = fits[-1]
+    last = replace(fits[-1], x=missing_told(fits[-1], believed))
     if prepared.hum is None:
         return before, _spread(raw, onto(last, raw, 6, 1e-8))
     cause = hum_cause(prepared.hum)
@@ -159,10 +176,10 @@ def _concluded(
     scale = excess[0] + apart
     if scale <= 0:
         scale = np.inf
-    gains = [max(a - b, 0.0) / scale for a, b in zip(excess, excess[1:], strict=False)]
+    gains = [(a - b) / scale for a, b in zip(excess, excess[1:], strict=False)]
     causes = found(search, path, whole[1], gains)
-    causes += [replace(c, gain=c.gain / scale) for c in channel]
-    left = 1.0 - sum(c.gain for c in causes)
+    causes += [replace(c, gain=c.gain / scale) for c in channel if c.gain > TOLD * scale]
+    left = excess[-1] / scale if causes and np.isfinite(scale) else 1.0 - sum(c.gain for c in causes)
     residual = raw.force_N - after
     tests = remains(full, residual, after, prepared.colour, whole[1].free)
     told = [r for r in tests if r.passed]

@@ -116,7 +116,7 @@ class Search:
             wide = list(pool.map(lambda i: self._widened(fit, sieved[i], family[i]), order[:SECOND]))
             wide.sort(key=lambda trials: trials[0].score)
             self.progress(f"closer: {', '.join(trials[0].id for trials in wide[:THIRD])}")
-            ended = list(pool.map(lambda trials: [self._carried(t, ALL) for t in trials[:2]], wide[:THIRD]))
+            ended = list(pool.map(lambda trials: [self._carried(t, ALL) for t in _contenders(trials)], wide[:THIRD]))
         found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[THIRD:]]]
         found_all += [sieved[i][0] for i in order[SECOND:]]
         return sorted(found_all, key=lambda t: t.score)
@@ -148,6 +148,9 @@ class Search:
         """More steps for the best, and the other forms of the family from where it ended."""
         best = self._carried(trials[0], MORE)
         out = [best, *trials[1:2]]
+        usual = next((t for t in trials if _usual(t) and t is not trials[0]), None)
+        if usual is not None:  # from its own start: where another form has ended may be a bad one
+            out.append(self._carried(usual, MORE))
         tried = {best.cause.form.name}
         for form in family:
             if form.name in tried or (form.amend is not None and best.cause.amplitude is None):
@@ -237,7 +240,7 @@ class Search:
             path.rivals.append(ranked)
             path.evidence.append(found)
             gained = now.chi2 - best.fit.chi2
-            if found.pays and not recurved:
+            if found.pays and not recurved and any(_another_law(c) for c in now.structure.causes):
                 recurved, other = True, self.recurved(now)
                 if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but a law of another shape
                     path.fits[-1] = other
@@ -254,12 +257,12 @@ class Search:
         """The fit with another form of a law that was put in place of the believed one, where that fits better."""
         best = now
         for index, cause in enumerate(now.structure.causes):
-            if cause.form.amend is None or cause.amplitude is not None or not cause.fitted:
+            if not _another_law(cause):
                 continue
             structure, x = reduced(now, index)
             without = refit(self.short, structure, x, 10, 1e-5)
             signatures = Signatures(self.short, without)
-            for effect, form in forms(structure, False, self.reach):
+            for effect, form in forms(structure, False, self.reach, also_unsought=True):
                 if effect.id != cause.id or form.name == cause.form.name:
                     continue
                 for s in starts(signatures, effect, form):
@@ -301,6 +304,21 @@ class Search:
                 if trial.score < score - 10 and believable(trial.fit, self.prepared):
                     best, score = trial.fit, trial.score
         return best
+
+
+def _another_law(cause: Cause) -> bool:
+    """Whether a cause stands in place of the believed law, and its curve can be of another shape."""
+    return cause.form.amend is not None and cause.amplitude is None and bool(cause.fitted)
+
+
+def _usual(trial: Trial) -> bool:
+    """Whether it is the first form of its family."""
+    return trial.cause.form.name == trial.cause.effect.forms[0].name
+
+
+def _contenders(trials: list[Trial]) -> list[Trial]:
+    """The best two of a family, and the best of its first form."""
+    return [*trials[:2], *[t for t in trials[2:] if _usual(t)][:1]]
 
 
 def _end(fit: Fit) -> Array:

@@ -35,6 +35,12 @@ def ordered(prepared: Prepared, fit: Fit, base: Fit) -> Fit:
     return replace(refit(prepared.short, structure, structure.x(pad, [values[i] for i in order], end), 8, 1e-8))
 
 
+def without(prepared: Prepared, fit: Fit, index: int) -> Fit:
+    """The fit without one of its causes."""
+    structure, x = reduced(fit, index)
+    return refit(prepared.short, structure, x, 30, 1e-8)
+
+
 def chain(prepared: Prepared, fit: Fit, base: Fit) -> list[Fit]:
     """Fits of the believed structure, with the first cause, with two …, up to all."""
     own = len(base.structure.causes)

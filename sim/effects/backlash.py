@@ -115,7 +115,14 @@ EFFECT = Effect(
             parameters=(
                 _GAP,
                 Parameter(
-                    "closing_force", "N", 1e-3, 100.0, 0.2, "force at which 1/e of the gap is left", starts=(0.1, 1.0)
+                    "closing_force",
+                    "N",
+                    1e-3,
+                    100.0,
+                    0.2,
+                    "force at which 1/e of the gap is left",
+                    starts=(0.1, 1.0),
+                    floor=("force_noise_N", 3.0),  # closed by less, it is another surface
                 ),
             ),
             blocks={"frame": loaded},

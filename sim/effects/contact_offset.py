@@ -3,6 +3,9 @@
 - `constant`: depth = position − offset.
 - `toe`: seating. The first part of the way takes up slack, tilt and roughness: δ = y²/(4·offset) up to y = 2·offset,
   then y − offset; ASTM D695 and D638 call this the toe of the curve and correct for the same offset.
+- `asperities`: rough faces meet by their summits first, and the load grows exponentially with approach until they are
+  flat: δ = s ln(1 + e^((y − offset)/s)), s the roughness (J. A. Greenwood, J. B. P. Williamson, Proc. R. Soc. A 295,
+  1966, 300–319, with exponentially distributed heights).
 
 With an exponential law a constant offset is exactly another m, and with a polynomial another polynomial.
 
@@ -11,6 +14,8 @@ J. Biomech. Eng. 129, 2007, 430–440, on how the point of contact and the stiff
 """
 
 from __future__ import annotations
+
+import math
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
@@ -30,6 +35,17 @@ def toe(dt: float, y: float, state: State, p: State) -> float:
     if y < 2.0 * p[0]:
         return y * y / (4.0 * p[0])
     return y - p[0]
+
+
+@block
+def asperities(dt: float, y: float, state: State, p: State) -> float:
+    """Depth behind a rough face; p = (offset, roughness)."""
+    u = (y - p[0]) / p[1]
+    if u > 40.0:
+        return y - p[0]
+    if u < -40.0:
+        return 0.0
+    return p[1] * math.log1p(math.exp(u))
 
 
 EFFECT = Effect(
@@ -74,6 +90,25 @@ EFFECT = Effect(
                 ),
             ),
             blocks={"depth": toe},
+        ),
+        Form(
+            name="asperities",
+            what="summits of a rough face touch first",
+            parameters=(
+                Parameter(
+                    "offset",
+                    "mm",
+                    -5.0,
+                    5.0,
+                    0.05,
+                    "true surface, of the flattened summits, minus believed surface",
+                    required=True,
+                    amplitude=True,
+                    floor=("position_noise_mm", 2.0),
+                ),
+                Parameter("roughness", "mm", 1e-4, 1.0, 0.02, "spread of the summits' heights", starts=(0.01, 0.05)),
+            ),
+            blocks={"depth": asperities},
         ),
     ),
 )

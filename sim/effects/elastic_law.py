@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from sim.pad import Pad
 
 KNOTS = 7
+FINE_KNOTS = 15
 
 
 def _exponential(pad: Pad, values: Mapping[str, float]) -> Pad:
@@ -49,12 +50,33 @@ def _polynomial(degree: int) -> Callable[[Pad, Mapping[str, float]], Pad]:
     return amend
 
 
-def _spline(pad: Pad, values: Mapping[str, float]) -> Pad:
-    from sim.elastic import Spline
+def _spline(knots: int) -> Callable[[Pad, Mapping[str, float]], Pad]:
+    def amend(pad: Pad, values: Mapping[str, float]) -> Pad:
+        from sim.elastic import Spline
 
-    depths = tuple(values["reach"] * i / KNOTS for i in range(1, KNOTS + 1))
-    forces = tuple(accumulate(values[f"rise_{i}"] for i in range(1, KNOTS + 1)))
-    return replace(pad, law=Spline(depths, forces))
+        depths = tuple(values["reach"] * i / knots for i in range(1, knots + 1))
+        forces = tuple(accumulate(values[f"rise_{i}"] for i in range(1, knots + 1)))
+        return replace(pad, law=Spline(depths, forces))
+
+    return amend
+
+
+def _spline_form(name: str, what: str, knots: int, sought: bool) -> Form:
+    """A monotone curve through evenly spaced points; `sought`: also where nothing yet speaks for another law."""
+    reach = Parameter("reach", "mm", 1e-3, 100.0, 3.0, "depth of the last point", required=True, fixed=True)
+    rises = [
+        Parameter(
+            f"rise_{i}",
+            "N",
+            0.0,
+            1e5,
+            0.8 * 1.3 ** (i * KNOTS / knots) * KNOTS / knots,
+            f"force at {i} of {knots} parts of the reach less that at {i - 1}",
+            required=True,
+        )
+        for i in range(1, knots + 1)
+    ]
+    return Form(name, what, (reach, *rises), amend=_spline(knots), sought=sought)
 
 
 def _polynomial_form(degree: int) -> Form:
@@ -103,25 +125,7 @@ EFFECT = Effect(
             amend=_power,
         ),
         *(_polynomial_form(degree) for degree in (2, 3, 4, 5)),
-        Form(
-            name="spline",
-            what="monotone curve through seven points",
-            parameters=(
-                Parameter("reach", "mm", 1e-3, 100.0, 3.0, "depth of the last point", required=True, fixed=True),
-                *(
-                    Parameter(
-                        f"rise_{i}",
-                        "N",
-                        0.0,
-                        1e5,
-                        0.8 * 1.3**i,
-                        f"force at {i} sevenths of the reach less that at {i - 1}",
-                        required=True,
-                    )
-                    for i in range(1, KNOTS + 1)
-                ),
-            ),
-            amend=_spline,
-        ),
+        _spline_form("spline", "monotone curve through seven points", KNOTS, True),
+        _spline_form("fine_spline", "monotone curve through fifteen points", FINE_KNOTS, False),
     ),
 )

@@ -5,10 +5,12 @@ they only ever take energy. `coefficient` is force over speed at `SPEED_MM_S`, a
 depends on depth: in the middle of what benches do, where forms agree on it, and not at an end that none was seen at.
 
 - `linear`: coefficient · v, Kelvin and Voigt's dashpot.
-- `hunt_crossley`: coefficient · (δ/at_depth)^n v, which starts at 0 at touch as measured impacts do (K. H. Hunt, F. R. E.
-  Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42, 1975, 440–445).
+- `hunt_crossley`: coefficient · (δ/at_depth)^n v, which starts at 0 at touch as measured impacts do (K. H. Hunt,
+  F. R. E. Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42, 1975,
+  440–445).
 - `with_stiffness`: coefficient · e^(a(δ − at_depth)) v, damping in proportion to a stiffness that grows exponentially.
-- `power`: coefficient · v ((v² + v_0²)/(SPEED_MM_S² + v_0²))^((n−1)/2): shear thinning below n = 1, linear under v_0 = 0.05 mm/s.
+- `power`: coefficient · v ((v² + v_0²)/(SPEED_MM_S² + v_0²))^((n−1)/2): shear thinning below n = 1, linear under
+  v_0 = 0.05 mm/s.
 """
 
 from __future__ import annotations
