@@ -103,7 +103,7 @@ def position_noise(position_mm: Array) -> float:
     step = resolution(position_mm)
     if step == 0.0 or step > 0.01 * np.ptp(position_mm):
         return jitter(position_mm)
-    return max(jitter(position_mm), _hopping(position_mm, step), step / np.sqrt(12.0))
+    return float(max(jitter(position_mm), _hopping(position_mm, step), step / np.sqrt(12.0)))
 
 
 def _hopping(position_mm: Array, step_mm: float) -> float:

@@ -56,7 +56,9 @@ def motion_between(
         return time_s, position_mm
     trapezoids = known | _trapezoids(time_s, position_mm, moving, groups, reach, noise_mm)
     groups = sorted([*groups, *known])
-    cut = [_cut(time_s, position_mm, *group, trapezoids.get(group), reach, noise_mm) for group in groups]
+    cut = [
+        _cut(time_s, position_mm, *group, trapezoids.get(group), reach, noise_mm, group in known) for group in groups
+    ]
     times = np.concatenate([t for t, _ in cut])
     if not len(times):
         return time_s, position_mm
@@ -342,9 +344,9 @@ def _golden(f: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _cut(
-    t: Array, x: Array, first: int, last: int, trapezoid: Trapezoid | None, reach: float, noise: float
+    t: Array, x: Array, first: int, last: int, trapezoid: Trapezoid | None, reach: float, noise: float, exact: bool
 ) -> tuple[Array, Array]:
-    """New nodes of one group, times and positions."""
+    """New nodes of one group, times and positions; `exact`: the samples are the trapezoid's own."""
     time = t[first : last + 1]
     h, steps = np.diff(time), np.abs(np.diff(x[first : last + 1]))
     corners = np.zeros(0)
@@ -363,10 +365,10 @@ def _cut(
     pieces = np.ceil(np.maximum(steps / (STEP * reach), np.sqrt(bend / (BEND * reach))))
     pieces = np.clip(pieces, 1, WIDEST).astype(np.intp)
     new = [time[k] + h[k] * np.arange(1, n) / n for k, n in enumerate(pieces) if n > 1]
-    if len(corners):  # where the acceleration jumped, the next sample wants some nodes of the new one alone
+    if exact and len(corners):  # where the acceleration jumped, the next sample wants some nodes of the new one alone
         following = time[np.clip(np.searchsorted(time, corners, side="right"), 0, len(time) - 1)]
         new += [corners, corners + (following - corners) / 3, corners + (following - corners) * 2 / 3]
-    fresh = np.unique(np.concatenate(new)) if new else np.zeros(0)
+    fresh = np.unique(np.concatenate([*new, corners])) if new or len(corners) else np.zeros(0)
     # A node on a sample says nothing, and a sliver of a step costs digits.
     at = np.clip(np.searchsorted(time, fresh, side="right") - 1, 0, len(h) - 1)
     away = np.minimum(fresh - time[at], time[at + 1] - fresh)

@@ -4,8 +4,8 @@
 - `toe`: seating. The first part of the way takes up slack, tilt and roughness: δ = y²/(4·offset) up to y = 2·offset,
   then y − offset; ASTM D695 and D638 call this the toe of the curve and correct for the same offset.
 - `asperities`: rough faces meet by their summits first, and the load grows exponentially with approach until they are
-  flat: δ = s ln(1 + e^((y − offset)/s)), s the roughness (J. A. Greenwood, J. B. P. Williamson, Proc. R. Soc. A 295,
-  1966, 300–319, with exponentially distributed heights).
+  flat: δ = s ln(1 + e^((y − offset)/s)), s = roughness · |offset| (J. A. Greenwood, J. B. P. Williamson, Proc. R.
+  Soc. A 295, 1966, 300–319, with exponentially distributed heights).
 
 With an exponential law a constant offset is exactly another m, and with a polynomial another polynomial.
 
@@ -39,13 +39,16 @@ def toe(dt: float, y: float, state: State, p: State) -> float:
 
 @block
 def asperities(dt: float, y: float, state: State, p: State) -> float:
-    """Depth behind a rough face; p = (offset, roughness)."""
-    u = (y - p[0]) / p[1]
+    """Depth behind a rough face; p = (offset, roughness over offset)."""
+    s = p[1] * abs(p[0])
+    if s < 1e-12:
+        return y - p[0]
+    u = (y - p[0]) / s
     if u > 40.0:
         return y - p[0]
     if u < -40.0:
-        return 0.0
-    return p[1] * math.log1p(math.exp(u))
+        return min(y - p[0], 0.0)
+    return s * math.log1p(math.exp(u))
 
 
 EFFECT = Effect(
@@ -106,7 +109,15 @@ EFFECT = Effect(
                     amplitude=True,
                     floor=("position_noise_mm", 2.0),
                 ),
-                Parameter("roughness", "mm", 1e-4, 1.0, 0.02, "spread of the summits' heights", starts=(0.01, 0.05)),
+                Parameter(
+                    "roughness",
+                    "1",
+                    0.02,
+                    2.0,
+                    0.3,
+                    "spread of the summits' heights over the offset",
+                    starts=(0.2, 0.7),
+                ),
             ),
             blocks={"depth": asperities},
         ),
