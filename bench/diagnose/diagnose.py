@@ -83,10 +83,13 @@ def _needless(prepared: Prepared, fits: list[Fit], excess: list[float], apart: f
     most_left = gains[least] >= MOST_LEFT * excess[least] and gains[least] >= SPEAKS * prepared.floor_N**2
     if small and not most_left:
         return least
-    later = [later_square(prepared, fit) for fit in fits]
-    harm = [b - HARM * a - 2.0 * prepared.floor_square_std for a, b in zip(later, later[1:], strict=False)]
-    worst = int(np.argmax(harm))
-    return worst if harm[worst] > 0.0 else None
+    later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
+    if all(later <= HARM * later_square(prepared, fit) for fit in fits[:-1]):
+        return None
+    own = len(fits[0].structure.causes)
+    rest = [later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(len(gains))]
+    best = int(np.argmin(rest))
+    return best if later > HARM * rest[best] else None
 
 
 def _flagged_square(prepared: Prepared, fit: Fit) -> float:
