@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 CHANNEL = ("outliers", "stuck_samples", "mains_hum")  # found by detectors, not by fitting
 MOST_STARTS = 96
+LOWEST_RINGING_HZ, FREQUENCIES = 4.0, 32
 PERIODS = 16
 SHORTEST = 0.12  # of the longest period
 MANY = 20
@@ -188,6 +189,17 @@ class Signatures:
         best = min(max(best, amplitude.lower), amplitude.upper)
         return best * (2 * along - best * square), best
 
+    def whole(self, cause: Cause) -> float:
+        """χ² that a cause takes as it stands, the pad's numbers free to first order; −inf where it makes no plant."""
+        structure = self.fit.structure.with_cause(cause)
+        added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
+        with np.errstate(all="ignore"):
+            change = force_at(self.data, structure, _with(self.fit, added)) - self.force
+        if not np.isfinite(change).all():
+            return -np.inf
+        column = self._clear(self.data.whitened(change))
+        return float(2.0 * np.sum(column * self.residual) - np.sum(column * column))
+
 
 def _with(fit: Fit, added: Array) -> Array:
     n = len(fit.x) - fit.structure.tail
@@ -204,13 +216,28 @@ def combinations(form: Form) -> Iterator[dict[str, float]]:
         yield dict(zip([p.name for p in shapes], values, strict=True))
 
 
+def _scanned(form: Form) -> Iterator[dict[str, float]]:
+    """Values to start from where nothing scales the effect; frequencies densely, since ringing has narrow minima."""
+    frequency = next((p for p in form.parameters if p.unit == "Hz"), None)
+    for values in combinations(form):
+        if frequency is None or values.get(frequency.name) != frequency.starts[0]:
+            if frequency is None:
+                yield values
+            continue
+        for f in np.geomspace(max(frequency.lower, LOWEST_RINGING_HZ), frequency.upper, FREQUENCIES):
+            yield {**values, frequency.name: float(f)}
+
+
 def starts(signatures: Signatures, effect: Effect, form: Form, most: int = 2) -> list[Start]:
     """The most promising starts of a form, best first."""
     cause = cause_of(effect, form)
     if form.amend is not None and cause.amplitude is None:
         return [Start(c, np.inf) for c in _amended(signatures.fit, cause)]
     if cause.amplitude is None:
-        return [Start(cause.with_start(**values), np.inf) for values in combinations(form)][:most]
+        tried = [cause.with_start(**values) for values in _scanned(form)]
+        if len(tried) > most:
+            tried = sorted(tried, key=lambda c: -signatures.whole(c))
+        return [Start(c, np.inf) for c in tried[:most]]
     amplitude = cause.amplitude
     found: list[Start] = []
     every = list(combinations(form))

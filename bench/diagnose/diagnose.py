@@ -18,6 +18,7 @@ from sim.pad import Pad
 from .channel import Faults, faults, not_of_the_motion, standing_off
 from .channel_causes import channel_causes, hum_cause
 from .data import Data, Prepared, prepare
+from .evidence import MOST_LEFT, SPEAKS
 from .held_out import later_square
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
@@ -78,12 +79,17 @@ def _needless(prepared: Prepared, fits: list[Fit], excess: list[float], apart: f
     """Number of a cause that is of no use for what was held out, or does harm to what comes later; None: all are."""
     gains = [a - b for a, b in zip(excess, excess[1:], strict=False)]
     least = int(np.argmin(gains))
-    if gains[least] <= (LEAST if len(fits) == 2 else FURTHER) * (excess[0] + apart):
+    small = gains[least] <= (LEAST if len(fits) == 2 else FURTHER) * (excess[0] + apart)
+    most_left = gains[least] >= MOST_LEFT * excess[least] and gains[least] >= SPEAKS * prepared.floor_N**2
+    if small and not most_left:
         return least
-    later = [later_square(prepared, fit) for fit in fits]
-    harm = [b - HARM * a - 2.0 * prepared.floor_square_std for a, b in zip(later, later[1:], strict=False)]
-    worst = int(np.argmax(harm))
-    return worst if harm[worst] > 0.0 else None
+    later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
+    if all(later <= HARM * later_square(prepared, fit) for fit in fits[:-1]):
+        return None
+    own = len(fits[0].structure.causes)
+    rest = [later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(len(gains))]
+    best = int(np.argmin(rest))
+    return best if later > HARM * rest[best] else None
 
 
 def _flagged_square(prepared: Prepared, fit: Fit) -> float:

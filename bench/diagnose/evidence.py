@@ -14,6 +14,7 @@ LEVEL = 0.01  # of a false alarm over all that is tried
 TRIED = 150.0  # candidates with their starts, as independent tries
 CRUMB = 0.002  # of the noise power: what is smaller is no finding
 BEYOND = 3.0  # standard deviations of touch-off and tare, within which neither is found wrong
+MOST_LEFT, SPEAKS = 0.6, 0.02  # of what is left, and of the noise power: a cause beside a far larger one takes so much
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 
 
@@ -29,6 +30,8 @@ class Evidence:
     """Of what the base leaves beyond the noise."""
     crumb: float
     """Δχ² over the number of samples."""
+    of_left: float
+    """Of what was left before the step."""
     first: bool
 
     @property
@@ -39,7 +42,9 @@ class Evidence:
     @property
     def pays(self) -> bool:
         """Significant, and large enough to speak of."""
-        return self.significant and self.crumb >= CRUMB and (self.first or self.share >= SHARE)
+        if not self.significant or self.crumb < CRUMB:
+            return False
+        return self.first or self.share >= SHARE or (self.of_left >= MOST_LEFT and self.crumb >= SPEAKS)
 
 
 def threshold(freedom: int) -> float:
@@ -47,11 +52,13 @@ def threshold(freedom: int) -> float:
     return float(chi2_law.isf(LEVEL / TRIED, max(freedom, 1)))
 
 
-def evidence_of(before: Fit, after: Fit, base: Fit, inflation: float, samples: float) -> Evidence:
-    """What the step from `before` to `after` is worth; `inflation`: of the variance along that step, by colour."""
+def evidence_of(before: Fit, after: Fit, base: Fit, inflation: float, samples: float, expected: float) -> Evidence:
+    """What the step from `before` to `after` is worth; `inflation`: of the variance along that step, by colour;
+    `expected`: χ² that noise alone leaves."""
     delta = before.chi2 - after.chi2
     freedom = max(after.free - before.free, 1)
-    excess = max(base.chi2 - samples, 1e-9)
+    excess = max(base.chi2 - expected, 1e-9)
+    left = max(before.chi2 - expected, delta, 1e-9)
     return Evidence(
         delta_chi2=delta,
         effective=delta / inflation,
@@ -59,6 +66,7 @@ def evidence_of(before: Fit, after: Fit, base: Fit, inflation: float, samples: f
         threshold=threshold(freedom),
         share=delta / max(excess, delta),
         crumb=delta / samples,
+        of_left=delta / left,
         first=before is base,
     )
 

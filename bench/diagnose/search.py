@@ -69,6 +69,8 @@ class Search:
         self.short = prepared.short
         self.believed = structure
         self.samples = float(prepared.full.weight.sum())
+        # what noise alone leaves of χ² on the stand-in, whose entries are means
+        self.expected = float(np.count_nonzero(self.short.weight > 0)) * float(np.sqrt(prepared.colour.memory))
         self.effective = max(self.samples / prepared.colour.memory, 20.0)
         full = prepared.full
         self.reach = Reach(
@@ -249,7 +251,7 @@ class Search:
             if not found.pays or now.chi2 - reshaped > SAME * gained:
                 break
             path.fits.append(best.fit)
-            if len(path.fits) > 2 and best.fit.chi2 > 1.05 * self.samples:
+            if len(path.fits) > 2 and best.fit.chi2 > 1.05 * self.expected:
                 path.fits[-1] = self.exchanged(path)
         return path
 
@@ -283,7 +285,7 @@ class Search:
         change = force_at(short, after.structure, after.x) - force_at(short, before.structure, before.x)
         direction = self.prepared.full.whitened(change[self.prepared.owner])
         inflation = self.prepared.colour.inflation(direction)
-        return evidence_of(before, after, base, inflation, self.samples)
+        return evidence_of(before, after, base, inflation, self.samples, self.expected)
 
     def exchanged(self, path: Path) -> Fit:
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it."""

@@ -82,7 +82,7 @@ def alternatives(
     colour = search.prepared.colour
     best = fit.chi2
     # what the family's shape leaves counts as noise when names are compared: no shape is exact
-    scale = max(best / max(search.samples, 1.0), 1.0) * np.sqrt(colour.memory)
+    scale = max(best / max(search.expected, 1.0), 1.0) * np.sqrt(colour.memory)
     gained = max(without_chi2 - best, 1e-12)
     out: list[Alternative] = []
     odds = 0.0
@@ -92,7 +92,7 @@ def alternatives(
         effective = delta / scale + extra * np.log(search.effective)
         share = float(np.clip((without_chi2 - t.fit.chi2) / gained, 0.0, 1.0))
         excluded = bool(effective > RIVAL and share < 0.995)
-        ratio = float(delta) / (_unexplained(best, search.samples) + 1.0)
+        ratio = float(delta) / (_unexplained(best, search.expected) + 1.0)
         odds += float(np.exp(-0.5 * min(max(_tempered(effective, share, ratio), 0.0), 200.0)))
         if not excluded or not out:
             out.append(Alternative(t.id, t.cause.form.name, share, float(delta), excluded))
