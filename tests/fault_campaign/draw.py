@@ -45,12 +45,7 @@ class Drawn:
 
 def reactions(base: str) -> list[tuple[str, Reaction]]:
     """What may strike on a bench: the rows of the table for it."""
-    return [
-        (kind.name, reaction)
-        for kind in KINDS.values()
-        for reaction in kind.reactions
-        if reaction.bench == base
-    ]
+    return [(kind.name, reaction) for kind in KINDS.values() for reaction in kind.reactions if reaction.bench == base]
 
 
 def draw(seed: int) -> Drawn:
