@@ -373,7 +373,8 @@ def _cut(
     at = np.clip(np.searchsorted(time, fresh, side="right") - 1, 0, len(h) - 1)
     away = np.minimum(fresh - time[at], time[at + 1] - fresh)
     fresh = fresh[away > 1e-3 * h[at]]
-    fresh = fresh[np.diff(fresh, prepend=-np.inf) > 1e-3 * float(h.min())]
+    if exact:
+        fresh = fresh[np.diff(fresh, prepend=-np.inf) > 1e-3 * float(h.min())]
     miss = x[first : last + 1] - position(time)
     return fresh, np.asarray(position(fresh) + np.interp(fresh, time, miss))
 

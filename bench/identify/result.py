@@ -25,6 +25,12 @@ class Parameter:
     unit: str
     std: float
 
+    def _unnamed_notes(self) -> list[str]:
+        """The notes; where there is one measurement without its name, which is that of a file, not of the data."""
+        if len(self.traces) != 1:
+            return list(self.notes)
+        return [note.removeprefix(f"{self.traces[0].name}: ") for note in self.notes]
+
     def to_json(self) -> dict[str, Any]:
         """The entry of fit.json; `std` is null where the data give none."""
         return {"value": self.value, "unit": self.unit, "std": self.std if math.isfinite(self.std) else None}
@@ -168,6 +174,6 @@ class FitResult:
             "held_out_rmse": self.held_out_rmse if math.isfinite(self.held_out_rmse) else None,
             "samples": self.samples,
             "seconds": self.seconds,
-            "notes": list(self.notes),
+            "notes": self._unnamed_notes(),
             **more,
         }
