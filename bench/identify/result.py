@@ -25,12 +25,6 @@ class Parameter:
     unit: str
     std: float
 
-    def _unnamed_notes(self) -> list[str]:
-        """The notes; where there is one measurement without its name, which is that of a file, not of the data."""
-        if len(self.traces) != 1:
-            return list(self.notes)
-        return [note.removeprefix(f"{self.traces[0].name}: ") for note in self.notes]
-
     def to_json(self) -> dict[str, Any]:
         """The entry of fit.json; `std` is null where the data give none."""
         return {"value": self.value, "unit": self.unit, "std": self.std if math.isfinite(self.std) else None}
@@ -147,6 +141,12 @@ class FitResult:
     def residual(self) -> Array:
         """Measured minus simulated force of the first measurement, N, at `time_s`."""
         return self.traces[0].residual_N
+
+    def _unnamed_notes(self) -> list[str]:
+        """The notes; where there is one measurement without its name, which is that of a file, not of the data."""
+        if len(self.traces) != 1:
+            return list(self.notes)
+        return [note.removeprefix(f"{self.traces[0].name}: ") for note in self.notes]
 
     def to_json(self) -> dict[str, Any]:
         """fit.json, as docs/formats.md has it; a scheme that counts its iterations adds them and V along the way,
