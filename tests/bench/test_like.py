@@ -57,7 +57,7 @@ def test_a_surface_that_is_off_is_found_within_its_doubt(fitted, off_mm):
     moved = replace(m, position_mm=m.position_mm - off_mm, surface_std_mm=0.02)
     certain = likeness(load_model(str(model)), replace(moved, surface_std_mm=0.0))
     doubted = likeness(load_model(str(model)), moved)
-    assert certain.moved_mm == 0 and "surface" not in certain.sentence and certain.rmse_N > 2 * here.rmse_N
+    assert certain.moved_mm == 0 and "surface" not in certain.sentence and certain.rmse_N > 1.5 * here.rmse_N
     assert doubted.moved_mm == pytest.approx(here.moved_mm + off_mm, abs=5e-4)
     assert doubted.rmse_N == pytest.approx(here.rmse_N, rel=1e-3)
     assert np.array_equal(doubted.measurement.position_mm, moved.position_mm), "the data stay as they were"
