@@ -219,12 +219,15 @@ def combinations(form: Form) -> Iterator[dict[str, float]]:
 def _scanned(form: Form) -> Iterator[dict[str, float]]:
     """Values to start from where nothing scales the effect; frequencies densely, since ringing has narrow minima."""
     frequency = next((p for p in form.parameters if p.unit == "Hz"), None)
-    for values in combinations(form):
-        if frequency is None or values.get(frequency.name) != frequency.starts[0]:
-            if frequency is None:
-                yield values
-            continue
-        for f in np.geomspace(max(frequency.lower, LOWEST_RINGING_HZ), frequency.upper, FREQUENCIES):
+    if frequency is None:
+        yield from combinations(form)
+        return
+    least = max(frequency.lower, LOWEST_RINGING_HZ)
+    if least >= frequency.upper:  # so slow are the data
+        least = frequency.lower
+    others = replace(form, parameters=tuple(p for p in form.parameters if p is not frequency))
+    for values in combinations(others):
+        for f in np.geomspace(least, frequency.upper, FREQUENCIES):
             yield {**values, frequency.name: float(f)}
 
 
