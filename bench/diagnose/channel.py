@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import poisson
 from scipy.stats import t as student_t
 
 from bench.felt_motion import resolution
@@ -19,6 +20,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FEW_REPEATS = 4  # equal pairs that are no accident where digits are many
+WIDEST = 0.67  # logarithm of changes by one step over those by two: noise of some steps
+MORE, SURELY = 0.05, 4.0  # of the equal pairs that chance makes, and of their deviations
 CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
 SETTLING = 20  # samples after a move that are not yet a hold
 CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
@@ -29,18 +32,19 @@ FAR = 6.0  # noise deviations that an outlier stands off at the least
 BULK = 9.0  # medians of the size: within some six deviations of white noise
 DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
 FALSE_SHARE, SEVERAL = 0.02, 10  # of values beyond the limit that may be noise, where at least so many lie there
-RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data
+RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data; or chance of repeats
 
 
 @dataclass(frozen=True)
 class Faults:
     """Of each force sample (m,), whether it is at a ceiling, repeats the one before, or stands off. `limit_N`: the
-    ceiling, where there is one."""
+    ceiling, where there is one. `stuck_share`: share that sticks, where single samples cannot all be told."""
 
     saturated: Mask
     stuck: Mask
     outlier: Mask
     limit_N: float | None = None
+    stuck_share: float | None = None
 
     @property
     def good(self) -> Mask:
@@ -60,8 +64,11 @@ def faults(force_N: Array) -> Faults:
         return Faults(none, none, none)
     saturated, limit = _ceiling(force_N)
     stuck = _stuck(force_N, saturated)
+    halted, share = _halted(force_N, saturated | stuck)
+    if not stuck.any():
+        stuck = halted
     outlier = _spikes(force_N, ~(saturated | stuck))
-    return Faults(saturated, stuck, outlier, limit)
+    return Faults(saturated, stuck, outlier, limit, share if stuck is halted else None)
 
 
 def _runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -112,6 +119,44 @@ def _stuck(force: Array, but: Mask) -> Mask:
         if count >= least and not but[start]:
             mask[start + 1 : start + count] = True
     return mask
+
+
+def _halted(force: Array, but: Mask) -> tuple[Mask, float | None]:
+    """Samples that repeat the one before, in a coarse channel, which repeats itself anyway: those in motion that do so
+    more likely by sticking than by chance; and the share of all samples that stick (None: none that is sure).
+
+    Chance makes as many changes of 0 steps as those of 1 to 4 steps foretell, whose logarithms go down with the square;
+    that holds for noise of any colour, which only makes it narrower.
+    """
+    mask, step = np.zeros(len(force), dtype=bool), resolution(force)
+    if step == 0.0:
+        return mask, None
+    change = np.rint(np.diff(force) / step).astype(np.intp)
+    change = change[~(but[1:] | but[:-1])]
+    none = float(np.count_nonzero(change == 0))
+    counts = np.array([np.count_nonzero(np.abs(change) == k) / 2.0 for k in range(1, 5)])
+    if counts.min() < 50 or np.log(counts[0] / counts[1]) > WIDEST:
+        return mask, None
+    # counts weigh as much as they are sure of
+    A = np.stack([np.ones(4), np.arange(1.0, 5.0) ** 2], axis=1)
+    inverse = np.linalg.inv((A * (2.0 * counts)[:, None]).T @ A)
+    level, slope = (inverse @ (A * (2.0 * counts)[:, None]).T @ np.log(counts)).tolist()
+    foretold = float(np.exp(level))
+    more = none - foretold
+    if more < max(MORE * foretold, SURELY * np.sqrt(foretold + foretold**2 * inverse[0, 0])):
+        return mask, None
+    share = more / len(change)
+    own = step * np.sqrt(0.5 / max(-slope, 1e-6))  # scatter of a change
+    # a pair counts with the change that its neighbours foretell, whether it is equal or not
+    before, after = force[1:-2] - force[:-3], force[3:] - force[2:-1]
+    usual = (force[3:] - force[:-3]) / 3.0
+    chance = step / (np.sqrt(2.0 * np.pi) * own) * np.exp(-0.5 * (usual / own) ** 2)
+    telling = (before * after > 0) & (chance < share) & ~(but[1:-2] | but[2:-1])
+    equal = telling & (force[1:-2] == force[2:-1])
+    if poisson.sf(int(equal.sum()) - 1, float(chance[telling].sum())) < 0.1 * RARE:
+        mask[np.flatnonzero(equal) + 2] = True
+        return mask, share
+    return mask, None
 
 
 def _never_equal(force: Array, repeats: int) -> bool:

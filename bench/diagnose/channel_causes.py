@@ -30,7 +30,7 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
     error = (prepared.raw.force_N - before_N)[at]
     n = max(len(at), 1)
     out = []
-    if prepared.hum is not None:
+    if prepared.hum is not None and prepared.hum.of_the_mains:
         hum = prepared.hum.force_N((prepared.full.time_s - prepared.full.time_s[0])[at][counted])
         id_, form, numbers = described(final, len(final.structure.causes) - 1)
         out.append(_named(id_, form, numbers, float(np.sum(hum**2)) / n))
@@ -43,8 +43,10 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
         if id_ == "saturation":
             numbers = {"limit": Number(float(flags.limit_N or 0.0), "N", prepared.noise.force_N / np.sqrt(count))}
         else:
-            share = count / n
-            numbers = {"fraction": Number(share, "1", float(np.sqrt(share * (1 - share) / n)))}
+            share, among = count / n, n
+            if id_ == "stuck_samples" and flags.stuck_share is not None:
+                share, among = flags.stuck_share, max(round(count / flags.stuck_share), 1)
+            numbers = {"fraction": Number(share, "1", float(np.sqrt(share * (1 - share) / among)))}
         out.append(_named(id_, effect(id_).forms[0].name, numbers, float(np.sum(error[mask] ** 2)) / n))
     return out
 

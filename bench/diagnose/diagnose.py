@@ -27,7 +27,9 @@ from .remains import remains
 from .result import Alternative, Diagnosis
 from .search import Path, Search
 from .spread import covariance
-from .verdict import EXPLAINED, chain, excesses, found, ordered, without
+from .swing import Swing
+from .swing import find as swinging
+from .verdict import chain, excesses, explains, found, ordered, without
 from .write import model_of
 
 Array = NDArray[np.float64]
@@ -111,8 +113,8 @@ def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fi
     raw = prepared.raw
     before = onto(fits[0], prepared.full, 6, 1e-8)
     last = replace(fits[-1], x=missing_told(fits[-1], believed))
-    if prepared.hum is None:
-        return before, _spread(raw, onto(last, raw, 6, 1e-8))
+    if prepared.hum is None or not prepared.hum.of_the_mains:
+        return before, _spread(prepared.full, onto(last, prepared.full, 6, 1e-8))
     cause = hum_cause(prepared.hum)
     structure = last.structure.with_cause(cause)
     own = structure.x(last.x[: len(structure.pad.coordinates)], None)[structure.of_cause(len(structure.causes) - 1)]
@@ -177,6 +179,10 @@ def _concluded(
 ) -> Diagnosis:  # fmt: skip
     full, raw, at = prepared.full, prepared.raw, prepared.at
     before, after = (force_at(full, f.structure, f.x) for f in whole)
+    residual = raw.force_N - after
+    swing = _swinging(prepared, residual)
+    if swing is not None:
+        floor, squares, excess = _apart(prepared, swing, residual, floor, squares, excess)
     channel = channel_causes(m, prepared, flags, before, whole[1])
     apart = sum(c.gain for c in channel)  # still in N²
     scale = excess[0] + apart
@@ -184,13 +190,12 @@ def _concluded(
         scale = np.inf
     gains = [(a - b) / scale for a, b in zip(excess, excess[1:], strict=False)]
     causes = found(search, path, whole[1], gains)
-    causes += [replace(c, gain=c.gain / scale) for c in channel if c.gain > TOLD * scale]
+    causes += [replace(c, gain=c.gain / scale) for c in channel if c.gain > min(TOLD * scale, SPEAKS * floor**2)]
     left = excess[-1] / scale if causes and np.isfinite(scale) else 1.0 - sum(c.gain for c in causes)
-    residual = raw.force_N - after
-    tests = remains(full, residual, after, prepared.colour, whole[1].free)
+    tests = remains(full, residual, prepared.colour, whole[1].free, swing)
     told = [r for r in tests if r.passed]
     if causes:
-        verdict = "explained" if left <= EXPLAINED else "unexplained"
+        verdict = "explained" if explains(left, causes) else "unexplained"
     else:
         verdict = "unexplained" if told and excess[0] > TOLD * floor**2 else "consistent"
     flagged = ~flags.good[prepared.kept]
@@ -222,6 +227,27 @@ def _concluded(
         ranking=_ranking(path),
         rivals=[(t.id, model_of(believed, t.fit, prepared)) for t in (path.rivals[0][:RIVALS] if path.rivals else [])],
     )
+
+
+def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:
+    """What swings in what is left, whatever the motion does."""
+    at = prepared.at[prepared.raw.weight[prepared.at] > 0]
+    return swinging(prepared.full.time_s[at], residual_N[at], prepared.sample_s)
+
+
+def _apart(
+    prepared: Prepared, swing: Swing, residual_N: Array, floor_N: float, squares: list[float], excess: list[float]
+) -> tuple[float, list[float], list[float]]:
+    """Noise floor, N, held-out squares and their excesses over it, N², with what swings: the holds took it for noise,
+    but for a line that was taken out before.
+    """
+    weight = prepared.full.weight
+    swings = swing.share * float(np.sum(weight * residual_N**2) / weight.sum())
+    line = 0.0
+    if prepared.hum is not None and not prepared.hum.of_the_mains:
+        line = 0.5 * prepared.hum.amplitude_N**2 * (1.0 + prepared.hum.ratio**2)
+    noise = max(floor_N**2 - max(swings - line, 0.0), 1e-6 * floor_N**2)
+    return float(np.sqrt(noise)), [s + line for s in squares], [e + swings for e in excess]
 
 
 def _ranking(path: Path) -> list[Alternative]:

@@ -1,7 +1,7 @@
 """Mains hum, found in the holds, where nothing else swings: a line in the spectrum of what smooth curves leave.
 
-It is taken out of the force before the search, which works on averages over blocks that hide it, and given back as a
-cause at the end.
+It is taken out of the force before the search, which works on averages over blocks that hide it, and given back at the
+end: as a cause where it can come from the mains, else as something that nothing explains.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from .noise import Part
 Array = NDArray[np.float64]
 
 LOWEST_HZ = 8.0
+MAINS_HZ, MULTIPLES = (45.0, 65.0), (1, 2, 3)
 LEVEL = 1e-5  # of a line by chance, over all frequencies
 LEAST_SHARE = 0.002  # of the noise power
 
@@ -31,6 +32,17 @@ class Line:
     phase_rad: float
     ratio: float
     third_phase_rad: float
+
+    sample_s: float = 1e-3
+
+    @property
+    def of_the_mains(self) -> bool:
+        """Whether the grid's frequency, or a low multiple of it, looks like this at this rate of sampling."""
+        step_Hz = (MAINS_HZ[1] - MAINS_HZ[0]) / 400.0
+        grid = np.outer(MULTIPLES, np.arange(MAINS_HZ[0], MAINS_HZ[1] + step_Hz, step_Hz)).ravel()
+        rate = 1.0 / self.sample_s
+        seen = np.abs(grid - rate * np.rint(grid / rate))
+        return bool(np.min(np.abs(seen - self.frequency_Hz)) <= 2.0 * step_Hz)
 
     def force_N(self, time_s: Array) -> Array:
         """The line at times (n,) since its start."""
@@ -76,7 +88,7 @@ def find(start_s: float, sample_s: float, parts: list[Part]) -> Line | None:
         more, s3, c3 = _taken(t, e, 3.0 * f)
         if more > 15.0 * float(e @ e) / len(e):
             ratio, third = float(np.hypot(s3, c3)) / amplitude, float(np.arctan2(c3, s3))
-    return Line(f, amplitude, phase, ratio, third)
+    return Line(f, amplitude, phase, ratio, third, step)
 
 
 def _spectrum(t: Array, e: Array, step: float) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ from bench.identify.motion import holds
 from .data import Data
 from .noise import Colour
 from .result import Remainder
+from .swing import Swing
 
 Array = NDArray[np.float64]
 
@@ -23,12 +24,13 @@ SENTENCES = {
     "speed": "goes with the speed",
     "phase": "follows the time since the last motion",
     "corner": "stands where moves begin and end",
+    "swing": "swings at {frequency:.3g} Hz, whatever the motion does",
     "memory": "is smoother from sample to sample than the noise",
 }
 
 
-def remains(data: Data, residual_N: Array, simulated_N: Array, colour: Colour, spent: int) -> list[Remainder]:
-    """The tests, most telling first. `residual_N`, `simulated_N` (n,) on the data's grid; `spent`: numbers fitted."""
+def remains(data: Data, residual_N: Array, colour: Colour, spent: int, swing: Swing | None) -> list[Remainder]:
+    """The tests, most telling first. `residual_N` (n,) on the data's grid; `spent`: numbers fitted."""
     use = np.flatnonzero(data.weight > 0)
     if len(use) < 60:
         return []
@@ -43,6 +45,8 @@ def remains(data: Data, residual_N: Array, simulated_N: Array, colour: Colour, s
         out.append(_remainder(name, p, found / total, made))
     value, found = _memory(e, colour, spent)
     out.append(_remainder("memory", float(chi2_law.sf(value, 1)), found, made))
+    if swing is not None:
+        out.append(Remainder("swing", 0.0, swing.share, SENTENCES["swing"].format(frequency=swing.frequency_Hz), True))
     return sorted(out, key=lambda r: (not r.passed, -r.share))
 
 

@@ -14,7 +14,8 @@ from .result import Alternative, CauseFound, Number
 from .search import Path, Search, Trial
 
 RIVAL = 25.0  # Δχ², rescaled by what is left: less does not exclude a rival
-EXPLAINED = 0.25
+EXPLAINED = 0.25  # of the error: what surely named causes may leave
+MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
 
 def ordered(prepared: Prepared, fit: Fit, base: Fit) -> Fit:
@@ -62,6 +63,12 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
         joined = number == 0 and len(fits) > 1
         out.append(max(excess, 0.0) if joined or excess > doubt else 0.0)
     return squares, out
+
+
+def explains(left: float, causes: Sequence[CauseFound]) -> bool:
+    """Whether causes explain an error of which a share is left: they may leave less, the less sure they are."""
+    sure = min((c.confidence for c in causes), default=1.0)
+    return left <= EXPLAINED * sure * (0.5 if len(causes) >= MANY else 1.0)
 
 
 def stage_of(path: Path, id_: str) -> tuple[Trial | None, list[Trial], float]:
