@@ -82,6 +82,8 @@ def _narrowed(p: Parameter, reach: Reach, longest: float) -> Parameter:
         default = reach.depth_mm
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm
+    elif p.name == "at_force":
+        default = 0.6 * reach.force_N
     elif p.name == "limit" and p.unit == "N":
         starts = tuple(share * reach.force_N for share in (0.6, 0.8, 0.93, 0.985))
     if lower >= upper:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from sim.effects import Form
 
-from .candidates import Reach, Signatures, Start, forms, is_rich, starts
+from .candidates import CHANNEL, Reach, Signatures, Start, forms, is_rich, starts
 from .data import Prepared
 from .evidence import Evidence, believable, evidence_of, penalty
 from .numbers import Cause, Structure, cause_of
@@ -242,9 +242,9 @@ class Search:
             path.rivals.append(ranked)
             path.evidence.append(found)
             gained = now.chi2 - best.fit.chi2
-            if found.pays and not recurved and any(_another_law(c) for c in now.structure.causes):
+            if found.pays and not recurved and len(path.fits) > 1:
                 recurved, other = True, self.recurved(now)
-                if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but a law of another shape
+                if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but one found of another shape
                     path.fits[-1] = other
                     del path.rivals[-1], path.evidence[-1]
                     continue
@@ -256,22 +256,25 @@ class Search:
         return path
 
     def recurved(self, now: Fit) -> Fit:
-        """The fit with another form of a law that was put in place of the believed one, where that fits better."""
-        best = now
+        """The fit with one of its causes in another form, also of those that only refine others; if that is better."""
+        tried: list[Trial] = []
         for index, cause in enumerate(now.structure.causes):
-            if not _another_law(cause):
+            if index < len(self.believed.causes) or cause.id in CHANNEL:
                 continue
             structure, x = reduced(now, index)
             without = refit(self.short, structure, x, 10, 1e-5)
             signatures = Signatures(self.short, without)
-            for effect, form in forms(structure, False, self.reach, also_unsought=True):
+            values = now.structure.values(now.x)[index]
+            for effect, form in forms(structure, structure.in_air, self.reach, also_unsought=True):
                 if effect.id != cause.id or form.name == cause.form.name:
                     continue
-                for s in starts(signatures, effect, form):
-                    trial = self._joined(without, s.cause, ALL, None)
-                    if trial is not None and trial.fit.chi2 < best.chi2:
-                        best = trial.fit
-        return best
+                own = cause_of(effect, form)
+                shared = {p.name: values[p.name] for p in own.fitted if p.name in values}
+                for start in [own.with_start(**shared), *(s.cause for s in starts(signatures, effect, form))]:
+                    trial = self._joined(without, start, MORE, None)
+                    tried += [trial] if trial is not None else []
+        tried = [self._carried(t, ALL) for t in sorted(tried, key=lambda t: t.score)[:2]]
+        return min([now, *(t.fit for t in tried)], key=lambda fit: fit.chi2)
 
     def settled(self, now: Fit, joined: Fit) -> Fit:
         """The fit before a cause was added, or a better one that the addition has led to: a valley may be long."""
@@ -306,11 +309,6 @@ class Search:
                 if trial.score < score - 10 and believable(trial.fit, self.prepared):
                     best, score = trial.fit, trial.score
         return best
-
-
-def _another_law(cause: Cause) -> bool:
-    """Whether a cause stands in place of the believed law, and its curve can be of another shape."""
-    return cause.form.amend is not None and cause.amplitude is None and bool(cause.fitted)
 
 
 def _usual(trial: Trial) -> bool:

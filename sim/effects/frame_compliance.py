@@ -3,16 +3,23 @@
 The motor side moves by x, the probe by y = x − C F. With a linear pad of stiffness K the bench sees K/(1 + C K) instead
 of K. The force used is the one at the cell, solved within the step (sim/kernel.py), never the last step's.
 
+`compliance` C is deflection over force at the force `at_force` (F_0) where it is no constant.
+
 - `linear`: C F.
-- `stiffening`: C F/(1 + |F|/stiffening_force): joints that bed in under load, to C · stiffening_force at most.
-- `power`: C F (1 + (F/1 N)²)^((n−1)/2): linear at small forces and |F|^n at large ones. Hertz's contact of probe
-  and seat has n = 2/3 (K. L. Johnson, Contact Mechanics, Cambridge, 1985, chapter 4).
+- `stiffening`: C F (1 + F_0/F_s)/(1 + |F|/F_s): joints that bed in under load.
+- `power`: C F ((1 + (F/1 N)²)/(1 + (F_0/1 N)²))^((n−1)/2): linear at small forces and |F|^n at large ones. Hertz's
+  contact of probe and seat has n = 2/3 (K. L. Johnson, Contact Mechanics, Cambridge, 1985, chapter 4).
+- `joint`: stiffer by the factor k below the preload P of a joint, which then opens: in proportion to
+  F − (1 − k) P (1 − e^(−|F|/P)) sgn F (J. H. Bickford, Introduction to the Design and Behavior of Bolted Joints, 4th
+  ed., CRC, 2008).
 
 Reference: W. C. Oliver, G. M. Pharr, J. Mater. Res. 7, 1992, 1564–1583: the compliance measured is that of the
 contact plus that of the load frame.
 """
 
 from __future__ import annotations
+
+import math
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
@@ -26,19 +33,29 @@ def spring(dt: float, force: float, state: State, p: State) -> float:
 
 @block
 def stiffening(dt: float, force: float, state: State, p: State) -> float:
-    """Deflection in mm; p = (compliance, stiffening_force)."""
-    return p[0] * force / (1.0 + abs(force) / p[1])
+    """Deflection in mm; p = (compliance, stiffening_force, at_force)."""
+    return p[0] * force * (1.0 + p[2] / p[1]) / (1.0 + abs(force) / p[1])
 
 
 @block
 def power(dt: float, force: float, state: State, p: State) -> float:
-    """Deflection in mm; p = (compliance, exponent)."""
-    return float(p[0] * force * (1.0 + force * force) ** (0.5 * (p[1] - 1.0)))
+    """Deflection in mm; p = (compliance, exponent, at_force)."""
+    return float(p[0] * force * ((1.0 + force * force) / (1.0 + p[2] * p[2])) ** (0.5 * (p[1] - 1.0)))
+
+
+@block
+def joint(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection in mm; p = (compliance, preload, stiff_share, at_force)."""
+    held = (1.0 - p[2]) * p[1]
+    opened = abs(force) + held * math.expm1(-abs(force) / p[1])
+    return p[0] * p[3] * math.copysign(opened, force) / (p[3] + held * math.expm1(-p[3] / p[1]))
 
 
 def _compliance(what: str) -> Parameter:
     return Parameter("compliance", "mm/N", 0.0, 1.0, 0.005, what, required=True, amplitude=True, starts=(0.005, 0.03))
 
+
+_AT_FORCE = Parameter("at_force", "N", 1e-3, 1e6, 5.0, "force at which the compliance holds", fixed=True)
 
 EFFECT = Effect(
     id="frame_compliance",
@@ -57,10 +74,11 @@ EFFECT = Effect(
             name="stiffening",
             what="ever stiffer with the force",
             parameters=(
-                _compliance("deflection per newton at small forces"),
+                _compliance("deflection per newton at `at_force`"),
                 Parameter(
-                    "stiffening_force", "N", 1e-2, 1e4, 5.0, "force at which the deflection is half", starts=(2.0, 20.0)
+                    "stiffening_force", "N", 1e-2, 1e4, 5.0, "force at which the compliance is half", starts=(2.0, 20.0)
                 ),
+                _AT_FORCE,
             ),
             blocks={"frame": stiffening},
         ),
@@ -68,10 +86,22 @@ EFFECT = Effect(
             name="power",
             what="deflection goes with a power of the force",
             parameters=(
-                _compliance("deflection per newton at small forces"),
+                _compliance("deflection per newton at `at_force`"),
                 Parameter("exponent", "1", 0.1, 1.5, 2.0 / 3.0, "power of the force in N", starts=(0.4, 0.8)),
+                _AT_FORCE,
             ),
             blocks={"frame": power},
+        ),
+        Form(
+            name="joint",
+            what="softer where a joint opens",
+            parameters=(
+                _compliance("deflection per newton at `at_force`"),
+                Parameter("preload", "N", 1e-2, 1e4, 2.0, "force at which the joint opens", starts=(0.5, 2.0, 8.0)),
+                Parameter("stiff_share", "1", 0.0, 1.0, 0.4, "compliance before over that after", starts=(0.2, 0.5)),
+                _AT_FORCE,
+            ),
+            blocks={"frame": joint},
         ),
     ),
 )

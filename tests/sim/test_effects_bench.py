@@ -122,21 +122,36 @@ class TestFriction:
 
 
 class TestOtherFrames:
+    @pytest.mark.parametrize(
+        ("form", "shape"), [("stiffening", [4.0]), ("power", [2 / 3]), ("joint", [3.0, 0.3])], ids=lambda v: str(v)
+    )
+    def test_the_compliance_is_the_secant_at_its_force(self, form: str, shape: list[float]) -> None:
+        block = active("frame_compliance", form).form.blocks["frame"]
+        for at_force in (1.0, 5.0, 20.0):
+            p = [0.02, *shape, at_force]
+            assert_allclose(block(0.0, at_force, [], p), 0.02 * at_force)
+            force = np.linspace(-20.0, 20.0, 41)
+            deflection = np.array([block(0.0, f, [], p) for f in force])
+            assert np.all(np.diff(deflection) > 0)
+            assert_allclose(deflection, -deflection[::-1])
+
     def test_stiffening(self) -> None:
-        force = np.linspace(-20.0, 20.0, 41)
-        block = active("frame_compliance", "stiffening", compliance=0.02, stiffening_force=4.0).form.blocks["frame"]
-        deflection = np.array([block(0.0, f, [], [0.02, 4.0]) for f in force])
-        assert_allclose(deflection, 0.02 * force / (1 + np.abs(force) / 4.0))
-        assert np.all(np.diff(deflection) > 0)
-        assert np.abs(deflection).max() < 0.02 * 4.0
+        block = active("frame_compliance", "stiffening").form.blocks["frame"]
+        small, large = (block(0.0, f, [], [0.02, 4.0, 5.0]) / f for f in (1e-6, 4.0))
+        assert_allclose(small / large, 2.0, rtol=1e-5)  # half the compliance at the stiffening force
 
     def test_the_power_form_is_hertzian_at_large_forces(self) -> None:
         block = active("frame_compliance", "power").form.blocks["frame"]
-        large = [block(0.0, f, [], [0.01, 2 / 3]) for f in (1e3, 8e3)]
+        large = [block(0.0, f, [], [0.01, 2 / 3, 5.0]) for f in (1e3, 8e3)]
         assert_allclose(large[1] / large[0], 4.0, rtol=1e-5)
-        assert_allclose(block(0.0, 1e-4, [], [0.01, 2 / 3]), 1e-6, rtol=1e-6)
 
-    @pytest.mark.parametrize("form", ["stiffening", "power"])
+    def test_a_joint_is_stiff_until_it_opens(self) -> None:
+        block = active("frame_compliance", "joint").form.blocks["frame"]
+        slopes = [(block(0.0, f + 1e-4, [], [0.02, 2.0, 0.3, 5.0]) - block(0.0, f, [], [0.02, 2.0, 0.3, 5.0])) / 1e-4
+                  for f in (0.0, 40.0)]  # fmt: skip
+        assert_allclose(slopes[0] / slopes[1], 0.3, rtol=1e-3)
+
+    @pytest.mark.parametrize("form", ["stiffening", "power", "joint"])
     def test_the_frame_is_solved_with_the_pad(self, form: str) -> None:
         frame = active("frame_compliance", form, compliance=0.05)
         t, x = walk(300)
