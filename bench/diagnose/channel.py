@@ -21,10 +21,12 @@ Mask = NDArray[np.bool_]
 
 FEW_REPEATS = 4  # equal pairs that are no accident where digits are many
 WIDEST = 0.67  # logarithm of changes by one step over those by two: noise of some steps
+BELOW = 0.7  # of the greatest force
 MORE, SURELY = 0.05, 4.0  # of the equal pairs that chance makes, and of their deviations
 CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
 SETTLING = 20  # samples after a move that are not yet a hold
 CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
+NEARLY = 0.95  # of a ceiling
 CEILING = 8  # samples in a row at the greatest force
 BESIDE = 5  # neighbours on either side that a stray sample is held against: bursts are shorter
 ASIDE, CALM = 8, 0.6  # neighbours on either side of a residual, and the share of them that a burst leaves alone
@@ -63,8 +65,10 @@ def faults(force_N: Array) -> Faults:
     if len(force_N) < 30:
         return Faults(none, none, none)
     saturated, limit = _ceiling(force_N)
-    stuck = _stuck(force_N, saturated)
-    halted, share = _halted(force_N, saturated | stuck)
+    # just below a ceiling that is not sharp a channel repeats itself too
+    ended = saturated if limit is None else saturated | (force_N * np.sign(limit) > NEARLY * abs(limit))
+    stuck = _stuck(force_N, ended)
+    halted, share = _halted(force_N, ended | stuck)
     if not stuck.any():
         stuck = halted
     outlier = _spikes(force_N, ~(saturated | stuck))
@@ -131,6 +135,7 @@ def _halted(force: Array, but: Mask) -> tuple[Mask, float | None]:
     mask, step = np.zeros(len(force), dtype=bool), resolution(force)
     if step == 0.0:
         return mask, None
+    but = but | (np.abs(force) > BELOW * float(np.abs(force).max()))  # where an amplifier that ends narrows the noise
     change = np.rint(np.diff(force) / step).astype(np.intp)
     change = change[~(but[1:] | but[:-1])]
     none = float(np.count_nonzero(change == 0))

@@ -20,6 +20,7 @@ from .verdict import described
 
 Array = NDArray[np.float64]
 
+SEEN = 0.001  # of the samples that repeat: told, whatever they add to the error
 FEWEST = 3  # stray samples that are called a fault
 
 
@@ -49,6 +50,11 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
             numbers = {"fraction": Number(share, "1", float(np.sqrt(share * (1 - share) / among)))}
         out.append(_named(id_, effect(id_).forms[0].name, numbers, float(np.sum(error[mask] ** 2)) / n))
     return out
+
+
+def by_themselves(cause: CauseFound) -> bool:
+    """Whether a fault of the channel shows in the samples without any model, so that it needs no gain to be told."""
+    return cause.id == "stuck_samples" and cause.parameters["fraction"].value > SEEN
 
 
 def _named(id_: str, form: str, numbers: Mapping[str, Number], square: float) -> CauseFound:
