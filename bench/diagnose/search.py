@@ -15,11 +15,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sim import effects
 from sim.effects import Form
 
 from .candidates import CHANNEL, Reach, Signatures, Start, forms, is_rich, starts
 from .data import Prepared
 from .evidence import Evidence, believable, evidence_of, penalty
+from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, extended, force_at, jacobian, reduced, refit
 
@@ -121,7 +123,25 @@ class Search:
             ended = list(pool.map(lambda trials: [self._carried(t, ALL) for t in _contenders(trials)], wide[:THIRD]))
         found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[THIRD:]]]
         found_all += [sieved[i][0] for i in order[SECOND:]]
-        return sorted(found_all, key=lambda t: t.score)
+        found_all.sort(key=lambda t: t.score)
+        return sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score)
+
+    def _late_alike(self, fit: Fit, ranked: list[Trial], family: dict[str, list[Form]]) -> list[Trial]:
+        """Where a delay, a lag or a stiff resonance fits best: the others again, from where they are as late as it."""
+        best = ranked[0] if ranked else None
+        late_s = 0.0 if best is None else lateness_s(best.id, best.fit.structure.values(best.fit.x)[-1])
+        if best is None or late_s <= 0.0:
+            return ranked
+        out = {t.id: t for t in ranked}
+        for id_ in [i for i in LATE if i in family and i != best.id]:
+            # with the bounds of physics: a mode beyond what the sampling resolves is late, and no more
+            own = effects.effect(id_)
+            late = [cause_of(own, own.forms[0], values) for values in as_late(id_, late_s)]
+            tried = [t for t in (self._joined(fit, cause, MORE, None) for cause in late) if t is not None]
+            if tried:
+                again = self._carried(min(tried, key=lambda t: t.score), ALL)
+                out[id_] = min([again, *([out[id_]] if id_ in out else [])], key=lambda t: t.score)
+        return list(out.values())
 
     def _promising(self, by_id: dict[str, list[Start]]) -> list[str]:
         """Ids whose first-order signature takes anything worth while, and those that have none."""

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from bench.diagnose.candidates import Reach, _scanned, narrowed
+from bench.diagnose.late import LATE, as_late, lateness_s
 from sim.effects import effect
+from sim.effects.base import Active
+from sim.elastic import Polynomial
+from sim.pad import Cascade, Pad
+from sim.relaxation import Relaxation
 
 
 @pytest.mark.parametrize("rate_Hz", [5.0, 8.0, 15.0, 30.0, 200.0, 2000.0])
@@ -22,3 +27,15 @@ def test_ringing_is_sought_at_all_frequencies_that_the_data_can_show(form, rate_
     assert 0 < found[0] <= max(4.0, 0.1 * rate_Hz) and found[-1] == pytest.approx(0.45 * rate_Hz)
     assert len({values["damping_ratio"] for values in starts}) > 1
     assert all(len(values) == len(starts[0]) for values in starts)
+
+
+@pytest.mark.parametrize("id_", LATE)
+def test_delay_lag_and_resonance_are_as_late_as_they_say(id_):
+    """Behind a long ramp of 1 N/s the force comes late by so many newtons as seconds."""
+    time = np.arange(0.0, 12.0, 1e-3)
+    for late_s in (0.001, 0.004):
+        for values in as_late(id_, late_s):
+            assert lateness_s(id_, values) == pytest.approx(late_s, rel=1e-9)
+            spring = Pad(Polynomial((0.0, 1.0)), Relaxation(), unilateral=False)
+            late = Cascade(spring, [Active(effect(id_), effect(id_).forms[0], values)])
+            assert time[-1] - late.simulate(time, time)[-1] == pytest.approx(late_s, rel=0.02)
