@@ -9,7 +9,7 @@ import numpy as np
 
 from .data import Prepared
 from .held_out import held_out_square
-from .refit import Fit, reduced, refit
+from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
 from .search import Path, Search, Trial
 
@@ -56,13 +56,21 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
     """(held-out mean squares, those less the noise floor's square), N²; what is within chance of 0 counts as 0."""
     squares = [held_out_square(prepared, fit) for fit in fits]
     n, memory = float(prepared.full.weight.sum()), prepared.colour.memory
+    noise_std = max(prepared.floor_square_std, _square_std(prepared, fits[-1]))
     out = []
     for number, (square, fit) in enumerate(zip(squares, fits, strict=True)):
-        doubt = 2.0 * prepared.floor_square_std + floor_N**2 * 2.0 * fit.free * memory / n
+        doubt = 2.0 * noise_std + floor_N**2 * 2.0 * fit.free * memory / n
         excess = square - floor_N**2
         joined = number == 0 and len(fits) > 1
         out.append(max(excess, 0.0) if joined or excess > doubt else 0.0)
     return squares, out
+
+
+def _square_std(prepared: Prepared, fit: Fit) -> float:
+    """Standard deviation of a mean square of what a fit leaves, N², as its own scatter tells: tails may be heavy."""
+    full = prepared.full
+    left = (full.force_N - force_at(full, fit.structure, fit.x))[full.weight > 0]
+    return float(np.std(left**2) * np.sqrt(prepared.colour.memory / max(len(left), 1)))
 
 
 def explains(left: float, causes: Sequence[CauseFound]) -> bool:
