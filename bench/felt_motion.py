@@ -197,19 +197,18 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
     planned: Moves = {}
     stretch = -1 - np.arange(len(clean)) // TOGETHER
     if 0.0 < left < noise:
+        step, coarse = resolution(position_mm), _coarse(position_mm)
         clean, std, hold = _rested(position_mm, clean, std, noise, left)
         stretch = np.where(hold > 0, hold, stretch)
         planned = planned_moves(time_s, position_mm, clean, noise, left)
         for (first, last), move in planned.items():
             inside = slice(first, last + 1)
             clean[inside] = move.position(time_s[inside])
-            at_ends = max(float(std[first]), float(std[last]), 0.7 * _coarse(position_mm))
+            at_ends = max(float(std[first]), float(std[last]), 0.7 * coarse)
             std[inside] = max(2.0 * noise / np.sqrt(last - first + 1), at_ends)
             stretch[inside] = 1 + len(clean) + first
         # a coarse scale's error averages out over levels that are passed, not over readings of one
-        std = np.where(
-            np.abs(np.gradient(clean)) < 2.0 * resolution(position_mm), np.maximum(std, _coarse(position_mm)), std
-        )
+        std = np.where(np.abs(np.gradient(clean)) < 2.0 * step, np.maximum(std, coarse), std)
     time, position = motion_between(time_s, clean, noise_mm=left, planned=planned)
     before = np.clip(np.searchsorted(time_s, time, side="right") - 1, 0, len(clean) - 1)
     return Felt(time, position, np.asarray(np.interp(time, time_s, std)), noise, stretch[before])

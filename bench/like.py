@@ -18,6 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from bench.diagnose.channel import Faults, faults, standing_off
+from bench.diagnose.data import prepare
+from bench.diagnose.diagnose import NEAR
 from bench.errors import InputError
 from bench.felt_motion import felt
 from bench.recording.types import Measurement
@@ -82,10 +85,11 @@ def likeness(model: Model, measurement: Measurement) -> Likeness:
     Where touch-off stated a doubt, the surface is moved: the shift s with the least Σ e² + V (s/std)², V being the mean
     square error at the best s without that prior. Positions whose surface is certain (CSV) are taken as they are.
     """
-    flagged = _spoiled(measurement)
+    alone = faults(measurement.force_N)
+    flagged = ~alone.good
     found = [_along(model, measurement, *path, flagged) for path in _paths(measurement)]
     best = found[-1] if found[-1].rmse_N < (1.0 - CLEARLY) * found[0].rmse_N else found[0]
-    flagged = _spoiled_beside(measurement, best.force_N, best.rmse_N, flagged)
+    flagged = _spoiled(measurement, best.force_N, best.rmse_N, alone)
     judged = _of(measurement, best.force_N, best.moved_mm, flagged)
     if best is found[0]:
         return judged
@@ -131,26 +135,15 @@ def _rms(error: Array) -> float:
     return math.sqrt(float(np.mean(error**2))) if error.size else math.nan
 
 
-def _spoiled(measurement: Measurement) -> Mask:
-    """Samples (m,) that show by themselves that the channel made them."""
-    from bench.diagnose.channel import faults
-
-    return ~faults(measurement.force_N).good
-
-
-def _spoiled_beside(measurement: Measurement, simulated_N: Array, rmse_N: float, flagged: Mask) -> Mask:
-    """The same, stray samples judged against the model where it is right enough, as in a diagnosis."""
-    from bench.diagnose.channel import faults, standing_off
-    from bench.diagnose.data import prepare
-    from bench.diagnose.diagnose import NEAR
-
+def _spoiled(measurement: Measurement, simulated_N: Array, rmse_N: float, alone: Faults) -> Mask:
+    """Samples (m,) that the channel made: those that show it alone, stray ones against the model where it is right
+    enough, as in a diagnosis."""
     try:
-        noise_N = prepare(measurement, ~flagged).floor_N
+        noise_N = prepare(measurement, alone.good).floor_N
     except InputError:
-        return flagged  # too few samples to tell
+        return ~alone.good  # too few samples to tell
     if not rmse_N <= NEAR * noise_N:
-        return flagged
-    alone = faults(measurement.force_N)
+        return ~alone.good
     faulty = alone.saturated | alone.stuck
     return faulty | standing_off(measurement.force_N - simulated_N, ~faulty, alone.outlier)
 

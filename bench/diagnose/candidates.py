@@ -21,7 +21,7 @@ from sim.elastic import NoPad
 
 from .data import Data
 from .numbers import Cause, Structure, cause_of
-from .refit import Fit, errors, force_at, jacobian
+from .refit import Fit, errors, extended, force_at, jacobian
 
 Array = NDArray[np.float64]
 
@@ -181,7 +181,7 @@ class Signatures:
             size = 0.5 * amplitude.upper
         structure = self.fit.structure.with_cause(cause.with_start(**{amplitude.name: size}))
         added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
-        x = _with(self.fit, added)
+        x = extended(self.fit, added)
         column = self._clear(self.data.whitened(force_at(self.data, structure, x) - self.force) / size)
         square = float(np.sum(column * column))
         if not np.isfinite(square) or square <= 1e-18:
@@ -196,16 +196,11 @@ class Signatures:
         structure = self.fit.structure.with_cause(cause)
         added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
         with np.errstate(all="ignore"):
-            change = force_at(self.data, structure, _with(self.fit, added)) - self.force
+            change = force_at(self.data, structure, extended(self.fit, added)) - self.force
         if not np.isfinite(change).all():
             return -np.inf
         column = self._clear(self.data.whitened(change))
         return float(2.0 * np.sum(column * self.residual) - np.sum(column * column))
-
-
-def _with(fit: Fit, added: Array) -> Array:
-    n = len(fit.x) - fit.structure.tail
-    return np.concatenate([fit.x[:n], added, fit.x[n:]])
 
 
 def combinations(form: Form) -> Iterator[dict[str, float]]:

@@ -118,7 +118,7 @@ def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fi
     cause = hum_cause(prepared.hum)
     structure = last.structure.with_cause(cause)
     own = structure.x(last.x[: len(structure.pad.coordinates)], None)[structure.of_cause(len(structure.causes) - 1)]
-    return before, _spread(raw, refit(raw, structure, extended(last, structure, own), 8, 1e-8))
+    return before, _spread(raw, refit(raw, structure, extended(last, own), 8, 1e-8))
 
 
 def _spread(data: Data, fit: Fit) -> Fit:

@@ -37,7 +37,7 @@ def missing_told(fit: Fit, believed: Structure) -> Array:
         relaxation = Relaxation(tuple(c for c, _ in modes), tuple(nu for _, nu in modes))
         values[index] = {**values[index], "share": share, "rate": rate}
         dealt = replace(structure.pad, pad=replace(pad, relaxation=relaxation))
-        return structure.x(dealt.x(), values, fit.x[len(fit.x) - structure.tail :])
+        return structure.x(dealt.x(), values, fit.of_run)
     return fit.x
 
 

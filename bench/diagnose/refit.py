@@ -38,6 +38,11 @@ class Fit:
         inside = (x > s.lower) & (x < s.upper) & (np.diag(self.matrix) > 1e-9)
         return int(inside.sum())
 
+    @property
+    def of_run(self) -> Array:
+        """The entries of x that belong to the run, and not to pad or causes."""
+        return self.x[len(self.x) - self.structure.tail :]
+
     def covariance(self) -> Array:
         """Of x (P, P), 0 at bounds: `spread`, or else for white noise."""
         if self.spread is not None:
@@ -165,10 +170,10 @@ def onto(fit: Fit, data: Data, max_steps: int = 25, tolerance: float = 1e-9) -> 
     return refit(data, fit.structure, fit.x, max_steps, tolerance, exact=True)
 
 
-def extended(fit: Fit, structure: Structure, added: Array) -> Array:
-    """x of a structure with one cause more at its end: the fit's numbers, the cause's, the surface's."""
+def extended(fit: Fit, added: Array) -> Array:
+    """x of a structure with one cause more at its end: the fit's numbers, the cause's, the run's."""
     n = len(fit.x) - fit.structure.tail
-    return np.concatenate([fit.x[:n], added, fit.x[n:]])
+    return np.concatenate([fit.x[:n], added, fit.of_run])
 
 
 def reduced(fit: Fit, index: int) -> tuple[Structure, Array]:

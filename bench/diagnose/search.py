@@ -185,7 +185,7 @@ class Search:
             structure = fit.structure.with_cause(cause)
             pad = best.fit.x[: len(structure.pad.coordinates)]
             before = best.fit.structure.values(best.fit.x)[:-1]
-            x = structure.x(pad, [*before, cause.start], _end(best.fit))
+            x = structure.x(pad, [*before, cause.start], best.fit.of_run)
             trial = self._solved(structure, x, MORE, None)
             if trial is not None:
                 out.append(trial)
@@ -218,7 +218,7 @@ class Search:
     def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
         structure = fit.structure.with_cause(cause)
         own = structure.x(fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
-        return self._solved(structure, extended(fit, structure, own), steps, known)
+        return self._solved(structure, extended(fit, own), steps, known)
 
     def _solved(self, structure: Structure, x: Array, steps: int, known: Array | None) -> Trial | None:
         if not np.isfinite(force_at(self.short, structure, x)).all():
@@ -339,8 +339,3 @@ def _usual(trial: Trial) -> bool:
 def _contenders(trials: list[Trial]) -> list[Trial]:
     """The best two of a family, and the best of its first form."""
     return [*trials[:2], *[t for t in trials[2:] if _usual(t)][:1]]
-
-
-def _end(fit: Fit) -> Array:
-    """The entries of x that belong to the run."""
-    return fit.x[len(fit.x) - fit.structure.tail :]

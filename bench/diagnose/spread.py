@@ -3,24 +3,22 @@ family leaves something that no shape of it explains."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.identify.colour import corrected_colour, spread_through
-from bench.identify.uncertainty import contributions, student, windowed
+from bench.identify.uncertainty import sandwich
 
 from .data import Data
 from .refit import Fit, errors, jacobian
 
 Array = NDArray[np.float64]
 
-DOUBT = 2.0  # standard deviations of its own by which the scores must say more than the colour
-
 
 def covariance(data: Data, fit: Fit) -> Array:
-    """Of x (P, P), 0 at bounds: sandwich H⁻¹ S H⁻¹, S by the residual's autocovariance, or by the scores summed
-    over windows of its memory where these say more (H. White, Econometrica 48, 1980; W. Newey, K. West,
-    Econometrica 55, 1987). `fit`: at its minimum on `data`.
+    """Of x (P, P), 0 at bounds, in units of the noise (`bench.identify.uncertainty.sandwich`). `fit`: at its minimum on
+    `data`.
     """
     structure, x = fit.structure, fit.x
     if not len(x):
@@ -30,27 +28,8 @@ def covariance(data: Data, fit: Fit) -> Array:
     J[~np.isfinite(J)] = 0.0
     e = errors(data, structure, x)[counted]
     prior = np.diag(structure.prior)
-    H = J.T @ J + prior
-    inside = (x > structure.lower) & (x < structure.upper) & (np.diag(H) > 1e-9)
-    if not inside.any():
-        return np.zeros_like(H)
-    scale = np.sqrt(np.maximum(np.diag(H), 1e-300))[inside]
-    index = np.ix_(inside, inside)
-    values, vectors = np.linalg.eigh(H[index] / np.outer(scale, scale))
-    inverse = np.zeros_like(H)
-    inverse[index] = (vectors / np.maximum(values, 1e-12 * values.max())) @ vectors.T / np.outer(scale, scale)
-    colour = corrected_colour([e], [J], inverse)
+    here = replace(fit, matrix=J.T @ J + prior, spread=None)
+    if not here.free:
+        return np.zeros_like(prior)
     square = max(float(np.mean(e * e)), 1.0)
-    steady = inverse @ (spread_through([J], colour.gamma) + square * prior) @ inverse
-    window = int(min(np.ceil(2 * colour.memory), len(e)))
-    scores = J * e[:, None]
-    felt = inverse @ (windowed([scores], window) + square * prior) @ inverse
-    independent = len(e) / colour.memory
-    freedom = max(independent - float(inside.sum()), 1.0)
-    even, uneven = np.diag(steady), np.diag(felt) * independent / freedom
-    doubt = np.sqrt(2 / contributions([scores], inverse, window))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = np.where(even > 0, uneven / even, 1.0)
-    ratio = np.where(ratio > 1 + DOUBT * doubt, ratio, 1.0)
-    widened = np.sqrt(ratio) * student(freedom)
-    return np.asarray(steady * np.outer(widened, widened))
+    return sandwich([e], [J], here.covariance(), square * prior, here.free).covariance

@@ -32,8 +32,7 @@ def ordered(prepared: Prepared, fit: Fit, base: Fit) -> Fit:
     structure = replace(fit.structure, causes=tuple(fit.structure.causes[i] for i in order))
     values = fit.structure.values(fit.x)
     pad = fit.x[: len(fit.structure.pad.coordinates)]
-    end = fit.x[len(fit.x) - fit.structure.tail :]
-    return replace(refit(prepared.short, structure, structure.x(pad, [values[i] for i in order], end), 8, 1e-8))
+    return refit(prepared.short, structure, structure.x(pad, [values[i] for i in order], fit.of_run), 8, 1e-8)
 
 
 def without(prepared: Prepared, fit: Fit, index: int) -> Fit:
@@ -47,8 +46,7 @@ def chain(prepared: Prepared, fit: Fit, base: Fit) -> list[Fit]:
     own = len(base.structure.causes)
     fits = [fit]
     while len(fits[-1].structure.causes) > own + 1:
-        structure, x = reduced(fits[-1], len(fits[-1].structure.causes) - 1)
-        fits.append(refit(prepared.short, structure, x, 30, 1e-8))
+        fits.append(without(prepared, fits[-1], len(fits[-1].structure.causes) - 1))
     return [base, *reversed(fits)] if len(fit.structure.causes) > own else [base]
 
 

@@ -26,40 +26,49 @@ class Spread:
 
 
 def spread_of(problem: Problem, estimate: Estimate) -> Spread:
-    """Sandwich H⁻¹ S H⁻¹, H = Σ J Jᵀ, in two forms.
-
-    - S = Σ J_k γ(k−l) J_lᵀ with the noise's autocovariance γ (`colour`): steady, but holds for even noise;
-    - S from the scores J e themselves, summed over windows as long as the residual remembers (Bartlett's kernel):
-      holds where the noise grows with depth or the model does not fit, but is uncertain itself. Where it says more
-      than the first by more than its own doubt, it counts.
-    Both are widened by Student's factor for the few samples that the residual may be worth. The prior of a doubtful
-    surface adds its own spread, and so do stamps of the position that may all be off together. Variables at a bound
-    have none.
+    """Sandwich H⁻¹ S H⁻¹ (`sandwich`). The prior of a doubtful surface adds its own spread, and so do stamps of the
+    position that may all be off together. Variables at a bound have none.
     """
     P = estimate.structure.size
-    scores, sensitivity, errors = _per_sample(problem, estimate)
+    sensitivity, errors = _per_sample(problem, estimate)
     free = _free(estimate)
     inverse = np.zeros((P, P))
     H = estimate.matrix[np.ix_(free, free)]
     inverse[np.ix_(free, free)] = _inverted(H)
-    colour = corrected_colour(errors, sensitivity, inverse)
     believed = np.diag(objective.prior_of(problem, estimate.structure)) * problem.noise_square
+    spread = sandwich(errors, sensitivity, inverse, believed, int(free.sum()))
+    covariance = spread.covariance.copy()
+    for late in _late(problem, estimate):
+        moved = inverse @ late
+        covariance += np.outer(moved, moved)
+    return Spread(covariance, spread.samples)
+
+
+def sandwich(errors: list[Array], sensitivity: list[Array], inverse: Array, believed: Array, free: int) -> Spread:
+    """H⁻¹ S H⁻¹ by two forms of S; of each run, errors (n,) and their derivatives J (n, P) in the same units.
+
+    - S = Σ J_k γ(k−l) J_lᵀ with the noise's autocovariance γ (`colour`): steady, but holds for even noise;
+    - S from the scores J e themselves, summed over windows as long as the residual remembers (Bartlett's kernel):
+      holds where the noise grows with depth or the model does not fit, but is uncertain itself (H. White, Econometrica
+      48, 1980; W. Newey, K. West, Econometrica 55, 1987). Where it says more than the first by more than its own
+      doubt, it counts.
+    Both are widened by Student's factor for the few samples that the residual may be worth. `inverse` (P, P): H⁻¹, 0
+    where nothing is `free`; `believed` (P, P): what priors add to S.
+    """
+    scores = [J * e[:, None] for J, e in zip(sensitivity, errors, strict=True)]
+    colour = corrected_colour(errors, sensitivity, inverse)
     by_colour = inverse @ (spread_through(sensitivity, colour.gamma) + believed) @ inverse
     window = int(min(np.ceil(2 * colour.memory), max(len(e) for e in errors)))
     by_scores = inverse @ (windowed(scores, window) + believed) @ inverse
     independent = sum(len(e) for e in errors) / colour.memory
-    freedom = max(independent - float(free.sum()), 1.0)
+    freedom = max(independent - free, 1.0)
     even, uneven = np.diag(by_colour), np.diag(by_scores) * independent / freedom
     doubt = np.sqrt(2 / contributions(scores, inverse, window))
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = np.where(even > 0, uneven / even, 1.0)
     ratio = np.where(ratio > 1 + TELLING * doubt, ratio, 1.0)
     widened = np.sqrt(ratio) * student(freedom)
-    covariance = by_colour * np.outer(widened, widened)
-    for late in _late(problem, estimate):
-        moved = inverse @ late
-        covariance += np.outer(moved, moved)
-    return Spread(covariance, independent)
+    return Spread(np.asarray(by_colour * np.outer(widened, widened)), independent)
 
 
 def student(freedom: float) -> float:
@@ -109,13 +118,13 @@ def _inverted(H: Array) -> Array:
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
 
 
-def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list[Array], list[Array]]:
-    """Of each run, over the samples that count: scores e J, J, e.
+def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list[Array]]:
+    """Of each run, over the samples that count: J, e.
 
     A block of w samples counts as one: e √w, J √w.
     """
     structure, x = estimate.structure, estimate.x
-    scores, sensitivities, errors = [], [], []
+    sensitivities, errors = [], []
     for run in problem.runs:
         J_parts, e_parts = [], []
         for piece in objective.simulate(run, structure, x, derivatives=True):
@@ -126,8 +135,7 @@ def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list
             e_parts.append((run.y[piece.at][counts] - piece.force[counts]) * root)
         sensitivities.append(np.concatenate(J_parts))
         errors.append(np.concatenate(e_parts))
-        scores.append(sensitivities[-1] * errors[-1][:, None])
-    return scores, sensitivities, errors
+    return sensitivities, errors
 
 
 def _late(problem: Problem, estimate: Estimate) -> list[Array]:
