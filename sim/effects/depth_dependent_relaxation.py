@@ -3,6 +3,8 @@
 - `exponential`: e^(slope · δ).
 - `linear`: 1 + slope · δ, continued below 0.1 by an exponential so that no rate ever vanishes.
 - `hyperbolic`: time constants linear in depth: 1/(1 − slope · δ), continued above 10 as the others are below.
+- `free_volume`: e^(slope · δ/(1 + δ/fading)): rates go with e^(−B/f), and the free volume f with depth (M. L. Williams,
+  R. F. Landel, J. D. Ferry, J. Am. Chem. Soc. 77, 1955, 3701–3707).
 
 All have the relative slope `slope` at the surface.
 
@@ -40,6 +42,13 @@ def hyperbolic(dt: float, depth: float, state: State, p: State) -> float:
     return 1.0 / (factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0)))
 
 
+@block
+def free_volume(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on the rates; p = (slope, fading)."""
+    here = max(depth, 0.0)
+    return math.exp(min(max(p[0] * here / (1.0 + here / p[1]), -50.0), 50.0))
+
+
 _SLOPE = Parameter(
     "slope",
     "1/mm",
@@ -66,6 +75,15 @@ EFFECT = Effect(
             what="time constants linear in depth",
             parameters=(_SLOPE,),
             blocks={"rate": hyperbolic},
+        ),
+        Form(
+            name="free_volume",
+            what="rates that go with the free volume, less and less with the depth",
+            parameters=(
+                _SLOPE,
+                Parameter("fading", "mm", 0.1, 1e3, 4.0, "depth at which half the slope is left", starts=(1.0, 4.0)),
+            ),
+            blocks={"rate": free_volume},
         ),
     ),
 )

@@ -5,9 +5,10 @@ The factor on F^e depends on depth δ and on the deepest depth so far; loading b
 - `exponential`: 1 − share (1 − e^(−(deepest − δ)/depth)).
 - `preconditioned`: the same on a pad that had been pressed to `already` before the data begin.
 - `linear`: 1 − share · min(1, (deepest − δ)/depth).
-- `ogden_roxburgh`: 1 − share · erf((deepest² − δ²)/(depth (depth + growth · deepest))): the error function of the
-  energy below the deepest, as for a linear spring (R. W. Ogden, D. G. Roxburgh, A pseudo-elastic model for the Mullins
-  effect in filled rubber, Proc. R. Soc. Lond. A 455, 1999, 2861–2877).
+- `ogden_roxburgh`: 1 − share · erf((W_max − W)/(w + growth · W_max)), with energies W that go with δ^power (2: a linear
+  spring), and w such that the argument is 1 at `depth` below the greatest depth of the data, `reach` (R. W. Ogden,
+  D. G. Roxburgh, A pseudo-elastic model for the Mullins effect in filled rubber, Proc. R. Soc. Lond. A 455, 1999,
+  2861–2877).
 - `discontinuous_damage`: 1 − share (1 − e^(−deepest/depth)) at all depths: the deepest point sets the stiffness
   (J. C. Simo, On a fully three-dimensional finite-strain viscoelastic damage model, Comput. Methods Appl. Mech. Eng.
   60, 1987, 153–173).
@@ -42,11 +43,15 @@ def linear(dt: float, depth: float, state: State, p: State) -> float:
 
 @block
 def ogden_roxburgh(dt: float, depth: float, state: State, p: State) -> float:
-    """Factor on F^e; p = (share, depth, growth, already)."""
+    """Factor on F^e; p = (share, depth, power, growth, reach, already)."""
     here = max(depth, 0.0)
-    state[0] = max(state[0], here, p[3])
-    deepest = state[0]
-    return 1.0 - p[0] * math.erf((deepest - here) * (deepest + here) / (p[1] * (p[1] + p[2] * deepest)))
+    state[0] = max(state[0], here, p[5])
+    most = (state[0] / p[4]) ** p[2]
+    scale = 1.0 - max(1.0 - p[1] / p[4], 0.0) ** p[2]  # of w + growth · W_max at the reach
+    if p[1] > p[4]:
+        scale = (p[1] / p[4]) ** p[2]
+    grown = (1.0 + p[3] * most) / (1.0 + p[3])
+    return 1.0 - p[0] * math.erf((most - (here / p[4]) ** p[2]) / (scale * grown))
 
 
 @block
@@ -98,7 +103,9 @@ EFFECT = Effect(
             parameters=(
                 _SHARE,
                 _DEPTH,
-                Parameter("growth", "1", 0.0, 10.0, 0.3, "growth of the distance with the deepest depth"),
+                Parameter("power", "1", 1.5, 8.0, 2.5, "power of the depth that the energy goes with"),
+                Parameter("growth", "1", 0.0, 10.0, 0.1, "growth of the scale with the greatest energy"),
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth below which `depth` counts", fixed=True),
                 _ALREADY,
             ),
             blocks={"elastic": ogden_roxburgh},

@@ -131,11 +131,12 @@ class TestStressSoftening:
         factors = {
             "exponential": 1 - share * (1 - np.exp(-(1.0 - x) / depth)),
             "linear": 1 - share * np.minimum(1, (1.0 - x) / depth),
-            "ogden_roxburgh": 1 - share * np.vectorize(math.erf)((1 - x**2) / (depth * (depth + growth))),
+            # W = x²/2 of a linear spring; at the reach, 1 mm, the argument is 1 at `depth` below it
+            "ogden_roxburgh": 1 - share * np.vectorize(math.erf)((1 - x**2) / (1 - (1 - depth) ** 2)),
             "discontinuous_damage": np.full(x.size, 1 - share * (1 - math.exp(-1.0 / depth))),
         }
         for form, factor in factors.items():
-            more = {"growth": growth} if form == "ogden_roxburgh" else {}
+            more = {"growth": growth, "power": 2.0, "reach": 1.0} if form == "ogden_roxburgh" else {}
             force = simulate(LINEAR, [active("stress_softening", form, share=share, depth=depth, **more)], TIME, CYCLES)
             assert_allclose(force[UP_2], K * x * factor, atol=1e-12)
 
@@ -212,19 +213,20 @@ class TestDamage:
 
 
 class TestRates:
-    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic"])
+    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic", "free_volume"])
     def test_relaxation_at_a_depth_runs_on_a_clock_of_its_own(self, form: str) -> None:
         slope, depth = -0.25, 1.5
-        factor = {"linear": 0.625, "exponential": math.exp(-0.375), "hyperbolic": 1 / 1.375}[form]
+        factors = {"linear": 0.625, "exponential": math.exp(-0.375), "hyperbolic": 1 / 1.375}
+        factor = factors.get(form, math.exp(-0.375 / 1.375))  # with half the slope left at 4 mm
         t = np.linspace(0.0, 3.0, 301)
         force = simulate(SOFT, [active("depth_dependent_relaxation", form, slope=slope)], t, np.full(t.size, depth))
         assert_allclose(force / force[0], GEL.reduced(factor * t), rtol=1e-10)
 
-    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic"])
+    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic", "free_volume"])
     def test_rates_stay_above_0_and_finite(self, form: str) -> None:
         block = effect("depth_dependent_relaxation").form(form).blocks["rate"]
         for slope in (-5.0, -0.5, 0.0, 0.5, 5.0):
-            factors = np.array([block(0.0, float(d), [], [slope]) for d in np.linspace(0, 10, 2001)])
+            factors = np.array([block(0.0, float(d), [], [slope, 4.0]) for d in np.linspace(0, 10, 2001)])
             assert np.isfinite(factors).all() and (factors > 0).all()
             assert factors[0] == 1.0
             assert_allclose(factors[1] - 1, slope * 0.005, rtol=0.03, atol=1e-12)
