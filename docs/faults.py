@@ -41,6 +41,10 @@ A run comes out of a fault in one of three ways. **Recovered**: the protocol run
 first cause is named in the message and the recording, the data are kept, and the true bench ends at rest with no more
 force and travel than its limits and the way to stop. **Refused to start**: exit code 2, nothing was commanded.
 
+Under `padbench emulate` the devices have them too, at times or at random (nobody tells an emulated bench which step
+begins). A port that is `unplugged` there is hung up and gone from its path, which comes back with it: its client has to
+open it anew. The host is the client's process then; faults of the host do nothing, but `host_stall` stalls the devices.
+
 `tests/faults/test_kinds.py` has each row of the tables happen to a run, and looks at the simulated world, not at what
 the host believes. A row shows the fault as the file would have it (without `kind` and `device`).
 `tests/fault_campaign` draws faults at random on protocols at random:

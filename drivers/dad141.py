@@ -17,6 +17,7 @@ from drivers.dad141_lines import FULL_SCALE, LINE_SIZE, Combined, LineCutter, ch
 from drivers.errors import CrcError, DeviceTimeout, DriverError, ExceptionReply, Overload, UnexpectedReply
 from drivers.lines import first_line
 from drivers.loadcell import ForceSample, LoadCellIdentity
+from drivers.polling import Polls
 from drivers.timing import LineTimer
 from drivers.wire import Exchange, Link, Pause, Steps
 
@@ -64,8 +65,7 @@ class Dad141:
         self._cutter = LineCutter()
         self._timer = LineTimer()
         self._samples: list[ForceSample] = []
-        self._poll: Exchange[ForceSample] | None = None
-        self._next_poll_s: float | None = None
+        self._polls = Polls(link, self._combined, self._interval_s)
         self._refused = False
 
     # -- set-up ------------------------------------------------------------------------------------------------
@@ -124,7 +124,7 @@ class Dad141:
             raise DriverError(self.name, "connect first: the resolution is not known yet")
         self._samples.clear()
         if self.mode == "poll":
-            self._next_poll_s = self.link.clock.now()
+            self._polls.begin()
             return
         self._cutter.clear()
         self._timer = LineTimer(1.0 / self.rate_hz if self.rate_hz else None)
@@ -151,8 +151,7 @@ class Dad141:
 
     def stop(self) -> Steps[None]:
         """End continuous output by a command that changes nothing, and wait for its answer."""
-        self._next_poll_s = None
-        self._poll = None
+        self._polls.forget()
         self._quiet()
         yield self._ask("ID", rb"D:(\d+)$")
 
@@ -166,15 +165,14 @@ class Dad141:
 
     def samples(self) -> list[ForceSample]:
         """New samples, oldest first; in poll mode also submits the next poll when it is due."""
-        if self._next_poll_s is not None:
-            self._serve_poll()
+        if self._polls.running:
+            self._samples += self._polls.serve()
         samples, self._samples = self._samples, []
         return samples
 
     def next_poll_s(self) -> float | None:
         """When the next poll is due; None when lines come by themselves, or the last poll is unanswered."""
-        waiting = self._poll is not None and not self._poll.done
-        return None if waiting else self._next_poll_s
+        return self._polls.next_s()
 
     def latency_s(self) -> float:
         """Interval, wire and filter: the age of the newest sample just before the next one comes."""
@@ -234,19 +232,7 @@ class Dad141:
 
     # -- exchanges ---------------------------------------------------------------------------------------------
 
-    def _serve_poll(self) -> None:
-        poll = self._poll
-        if poll is not None and poll.done:
-            self._poll = None
-            if poll.error is None:
-                self._samples.append(poll.result())
-        now = self.link.clock.now()
-        assert self._next_poll_s is not None
-        if self._poll is None and now >= self._next_poll_s and self.link.broken is None:
-            self._poll = self.link.submit(self._combined())
-            self._next_poll_s = max(self._next_poll_s + self._interval_s(), now)
-
-    def _combined(self) -> Exchange[ForceSample]:
+    def _combined(self) -> Exchange[ForceSample | None]:
         wire_s = self.link.wire_s
 
         def parse(frame: bytes, sent_s: float, received_s: float) -> ForceSample:

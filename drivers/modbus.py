@@ -95,7 +95,9 @@ class ModbusClient:
 
     def read_registers(self, table: Literal["holding", "input"], address: int, count: int) -> Exchange[list[int]]:
         """Registers from a table (functions 03, 04)."""
-        return self.sample_registers(table, address, count, lambda registers, _time, _received: registers)
+        return self.sample_registers(
+            table, address, count, lambda registers, _time, _received: registers, repeatable=True
+        )
 
     def sample_registers(
         self,
@@ -103,8 +105,14 @@ class ModbusClient:
         address: int,
         count: int,
         convert: Callable[[list[int], float, float], T],
+        *,
+        repeatable: bool | None = None,
     ) -> Exchange[T]:
-        """Registers turned into a value; `convert(registers, time_s, received_s)` gets the time they were read at."""
+        """Registers turned into a value; `convert(registers, time_s, received_s)` gets the time they were read at.
+
+        Over TCP it is not repeated of itself: a second try bears the same number, so that a late reply to the first
+        would be taken for its own, and for a value of that time.
+        """
 
         def convert_reply(reply: ModbusPDU, time_s: float, received_s: float) -> T:
             if len(reply.registers) != count:  # its byte count says less than the frame holds
@@ -114,7 +122,9 @@ class ModbusClient:
             return convert(list(reply.registers), time_s, received_s)
 
         request = _READS[table](address=address, count=count)
-        return self.request(f"read {count} from {table} {address:#06x}", request, 5 + 2 * count, convert_reply)
+        name = f"read {count} from {table} {address:#06x}"
+        again = self.transport == "rtu" if repeatable is None else repeatable
+        return self.request(name, request, 5 + 2 * count, convert_reply, repeatable=again)
 
     def read_holding(self, address: int, count: int = 1) -> Exchange[list[int]]:
         """Holding registers (function 03)."""

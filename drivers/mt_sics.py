@@ -18,6 +18,7 @@ from drivers.dad141_lines import LineCutter
 from drivers.errors import DeviceTimeout, ExceptionReply, FrameError, Overload, ReadbackError, UnexpectedReply
 from drivers.lines import first_line
 from drivers.loadcell import ForceSample, LoadCellIdentity
+from drivers.polling import Polls
 from drivers.timing import LineTimer
 from drivers.wire import Exchange, Link, Pause, Steps
 
@@ -79,8 +80,7 @@ class MtSics:
         self._cutter = LineCutter()
         self._timer = LineTimer()
         self._samples: list[ForceSample] = []
-        self._poll: Exchange[ForceSample | None] | None = None
-        self._next_poll_s: float | None = None
+        self._polls = Polls(link, self._reading, self._interval_s)
         self._refused: bytes | None = None
 
     # -- set-up ------------------------------------------------------------------------------------------------
@@ -117,7 +117,7 @@ class MtSics:
         """Continuous: have the device send by itself, wait for the first value. Poll: begin with the next call."""
         self._samples.clear()
         if self.mode == "poll":
-            self._next_poll_s = self.link.clock.now()
+            self._polls.begin()
             return
         self._cutter.clear()
         self._timer = LineTimer(1.0 / self.rate_hz if self.rate_hz else None)
@@ -136,10 +136,7 @@ class MtSics:
 
     def stop(self) -> Steps[None]:
         """End the stream, and see that the tare is still what it was; raises `ReadbackError` where it is not."""
-        self._next_poll_s = None
-        while self._poll is not None and not self._poll.done:
-            yield Pause(0.001)
-        self._poll = None
+        yield from self._polls.end()
         yield from self._end_stream()
         if self._tare is not None:
             tare = yield self._ask_tare()
@@ -187,15 +184,14 @@ class MtSics:
 
     def samples(self) -> list[ForceSample]:
         """New samples, oldest first; in poll mode also submits the next poll when it is due."""
-        if self._next_poll_s is not None:
-            self._serve_poll(self._next_poll_s)
+        if self._polls.running:
+            self._samples += self._polls.serve()
         samples, self._samples = self._samples, []
         return samples
 
     def next_poll_s(self) -> float | None:
         """When the next poll is due; None when lines come by themselves, or the last poll is unanswered."""
-        waiting = self._poll is not None and not self._poll.done
-        return None if waiting else self._next_poll_s
+        return self._polls.next_s()
 
     def latency_s(self) -> float:
         """Interval and wire: the age of the newest sample just before the next one comes."""
@@ -206,19 +202,6 @@ class MtSics:
             return 1.0 / self.rate_hz
         wire_s = self.link.wire_s(LINE_BYTES + (4 if self.mode == "poll" else 0))
         return max(self._timer.interval_s or 0.0, 1.0 / self._updates_Hz if self._updates_Hz else 0.0, wire_s + 0.002)
-
-    def _serve_poll(self, due_s: float) -> None:
-        poll = self._poll
-        if poll is not None and poll.done:
-            self._poll = None
-            if poll.error is None:
-                sample = poll.result()
-                if sample is not None:
-                    self._samples.append(sample)
-        now = self.link.clock.now()
-        if self._poll is None and now >= due_s and self.link.broken is None:
-            self._poll = self.link.submit(self._reading())
-            self._next_poll_s = max(due_s + self._interval_s(), now)
 
     def _listen(self, data: bytes, received_s: float) -> None:
         """Take bytes of the stream. `S I` takes its place in it and gives no sample; broken lines are counted."""

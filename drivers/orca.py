@@ -98,12 +98,13 @@ class Orca:
     # -- identity and clamps -----------------------------------------------------------------------------------
 
     def connect(self) -> Steps[MotorIdentity]:
-        """Serial number, firmware, stator, realised link settings, zero mode; commands nothing."""
+        """Serial number, firmware, stator, realised link settings, zero mode, mode; commands nothing."""
         words = yield self._modbus.read_holding(Register.SERIAL_NUMBER, 7)
         stator = (yield self._modbus.read_holding(Register.STATOR))[0]
         link = yield self._modbus.read_holding(Register.BAUDRATE, 3)
         self._hold_back(1e-6 * link[2])
         zero_mode = (yield self._modbus.read_holding(Register.ZERO_MODE))[0]
+        mode = (yield self._modbus.read_holding(Register.MODE_NOW))[0]
         if stator not in STATORS:
             raise DriverError(
                 self.name, f"the device answers, but reports stator type {stator}, which no Orca has; check 'driver'"
@@ -117,6 +118,8 @@ class Orca:
                 "device_baudrate": decode(link[0:2], "u32", "low_first"),
                 "device_gap_us": link[2],
                 "zero_mode": ZERO_MODES.get(zero_mode, str(zero_mode)),
+                "mode": mode_name(mode),
+                "energised": mode != Mode.SLEEP,
             },
         )
 

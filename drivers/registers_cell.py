@@ -7,10 +7,11 @@ import math
 from drivers.errors import UnexpectedReply
 from drivers.loadcell import ForceSample, LoadCellIdentity
 from drivers.modbus import ModbusClient
+from drivers.polling import Polls
 from drivers.registers import HOST_SLACK_S
 from drivers.regmap import LoadCellMap
 from drivers.sequence import Signals
-from drivers.wire import Exchange, Link, Pause, Steps
+from drivers.wire import Exchange, Link, Steps
 
 PLAUSIBLE = (1e-12, 1e12)
 """A reading that is not zero and lies outside of this has its words in the wrong order."""
@@ -44,9 +45,7 @@ class RegisterLoadCell:
         assert block_name is not None
         self._block_name = block_name
         self._block = device.blocks[block_name]
-        self._samples: list[ForceSample] = []
-        self._poll: Exchange[ForceSample] | None = None
-        self._next_poll_s: float | None = None
+        self._polls = Polls(link, self._exchange, lambda: 1.0 / self.rate_hz)
 
     def connect(self) -> Steps[LoadCellIdentity]:
         """Read what the map names under `identify`, and one sample; raises where the number makes no sense."""
@@ -65,42 +64,26 @@ class RegisterLoadCell:
 
     def start(self) -> Steps[None]:
         """Begin to poll with the next call of `samples`."""
-        self._samples.clear()
-        self._next_poll_s = self.link.clock.now()
+        self._polls.begin()
         yield from ()
 
     def samples(self) -> list[ForceSample]:
         """New samples; submits the next poll when it is due and the last one is answered."""
-        poll = self._poll
-        if poll is not None and poll.done:
-            self._poll = None
-            if poll.error is None:
-                self._samples.append(poll.result())
-        if self._next_poll_s is not None and self._poll is None and self.link.broken is None:
-            now = self.link.clock.now()
-            if now >= self._next_poll_s:
-                self._poll = self.link.submit(self._exchange())
-                self._next_poll_s = max(self._next_poll_s + 1.0 / self.rate_hz, now)
-        samples, self._samples = self._samples, []
-        return samples
+        return self._polls.serve()
 
     def stop(self) -> Steps[None]:
         """Poll no more, and let the last poll be answered."""
-        self._next_poll_s = None
-        while self._poll is not None and not self._poll.done:
-            yield Pause(0.001)
-        self._poll = None
+        yield from self._polls.end()
 
     def latency_s(self) -> float:
         """Poll interval, and the exchange on the wire."""
         return 1.0 / self.rate_hz + self.link.wire_s(8 + 5 + 2 * self._block.count) + self.map.reply.turnaround_s
 
     def next_poll_s(self) -> float | None:
-        """When the next poll is due; None while the last one is unanswered, as its answer wakes whoever waits."""
-        waiting = self._poll is not None and not self._poll.done
-        return None if waiting else self._next_poll_s
+        """When the next poll is due; None while the last one is unanswered, or the port is lost."""
+        return self._polls.next_s()
 
-    def _exchange(self) -> Exchange[ForceSample]:
+    def _exchange(self) -> Exchange[ForceSample | None]:
         return self._modbus.sample_registers(
             "input" if self._block.table == "input" else "holding",
             self._block.address,

@@ -99,7 +99,8 @@ class BenchPlant:
         self._axis[a.POSITION] = self._axis[a.SETPOINT] = position_mm
         force = self.plant.step(0.0, position_mm - surface_mm)
         self._axis[a.FORCE] = force
-        self._ceiling_N = self._limit_N = settings.max_force_N
+        self._limit_N = settings.max_force_N
+        self._weak_N: dict[object, float] = {}
         self._jammed = self._clamped = False
         self._history = np.zeros((8192, a.HISTORY))
         self._history[0, a.H_POSITION] = self._history[0, a.H_SETPOINT] = position_mm
@@ -234,7 +235,7 @@ class BenchPlant:
         if not force_N >= 0.0:
             raise ValueError("a force limit is 0 or more")
         self._limit_N = force_N
-        self._s[a.MAX_FORCE] = min(force_N, self._ceiling_N)
+        self._s[a.MAX_FORCE] = self._strength_N
 
     def brake(self, on: bool) -> None:
         """Clamp the mover, or let it go."""
@@ -243,10 +244,20 @@ class BenchPlant:
 
     # what goes wrong with it
 
-    def weaken(self, force_N: float) -> None:
-        """The drive can push no more than this from now on (N), whatever it is allowed."""
-        self._ceiling_N = min(force_N, self.settings.max_force_N)
-        self._s[a.MAX_FORCE] = min(self._limit_N, self._ceiling_N)
+    def weaken(self, cause: object, force_N: float | None) -> None:
+        """The drive can push no more than this from now on (N), whatever it is allowed; None: that cause is gone.
+
+        The least of all causes counts: a hot drive does not free a stalled one.
+        """
+        if force_N is None:
+            self._weak_N.pop(cause, None)
+        else:
+            self._weak_N[cause] = force_N
+        self._s[a.MAX_FORCE] = self._strength_N
+
+    @property
+    def _strength_N(self) -> float:
+        return min(self.settings.max_force_N, self._limit_N, *self._weak_N.values())
 
     def jam(self, on: bool) -> None:
         """The mover sticks where it is, or comes free again."""

@@ -42,7 +42,7 @@ def main(args: argparse.Namespace) -> int:
 
     with OpenBench(bench) as work:
         wishes = doctor.Wishes(
-            args.seconds, args.force_cap, args.press, lambda question: agreed(question, yes=args.yes)
+            args.seconds, args.force_cap, args.press, lambda question: agreed(question, yes=args.yes, must_say=True)
         )
         checkup = doctor.examine(work, wishes)
     lines = [line for finding in checkup.findings for line in finding.lines()]

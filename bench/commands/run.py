@@ -37,8 +37,8 @@ def main(args: argparse.Namespace) -> int:
     from bench.config import load_bench, load_model, simulated
     from bench.preflight import check
     from bench.protocol import load_protocol
-    from bench.recording.unfinished import left_behind, notice
-    from bench.run.folder import discard, make_folder, must_be_free
+    from bench.recording.unfinished import left_behind, must_be_idle, notice
+    from bench.run.folder import RUNS, discard, make_folder, must_be_free
     from bench.run.runner import Notes, run_protocol
     from bench.shipped import find_file
 
@@ -58,6 +58,8 @@ def main(args: argparse.Namespace) -> int:
             f"bench '{bench.name}' is real hardware, and nobody is said to stand at it\n"
             "  stand there, a hand at its emergency stop, and add --attended (or dry-run it with --simulated)"
         )
+    if not bench.all_simulated:
+        must_be_idle(args.out.parent if args.out is not None else Path(RUNS), bench.name)
     folder = make_folder(protocol.name, args.out, datetime.datetime.now())
     left = left_behind(folder.parent, bench.name) if not bench.all_simulated else None
     if left is not None:
@@ -76,7 +78,7 @@ def main(args: argparse.Namespace) -> int:
                 planned_s=preflight.duration_s + preflight.approach_s,
                 left=left,
             )
-    except InputError:
+    except (InputError, Refused):
         discard(folder)  # no device has been reached: nothing was measured, and the same command may be given again
         raise
     _say_outcome(outcome, bench, time.perf_counter() - started)

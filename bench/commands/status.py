@@ -19,9 +19,11 @@ def main(args: argparse.Namespace) -> int:
     bench = bench_of(args)
     from bench.daily import look
     from bench.daily.open_bench import OpenBench
-    from bench.recording.unfinished import left_behind, notice
+    from bench.recording.unfinished import left_behind, must_be_idle, notice
     from bench.run.folder import RUNS
 
+    if not bench.all_simulated:
+        must_be_idle(Path(RUNS), bench.name)
     left = left_behind(Path(RUNS), bench.name) if not bench.all_simulated else None
     with OpenBench(bench) as work:
         found = look.status(work)

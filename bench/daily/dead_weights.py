@@ -111,5 +111,8 @@ def lines(found: Calibration, readings: list[Reading], scale: float, sign: int) 
     known = f"{hysteresis:.3f} %" if hysteresis is not None else "not known (go up and down: --and-back)"
     out.append(f"linearity {found.linearity_percent:.3f} % of {found.span_N:.3g} N, hysteresis {known}")
     if found.sign < 0:
-        out.append("the sign turns: compression read negative; every limit of force was on the wrong side until now")
+        out.append(
+            "THE SIGN TURNS: a load that presses read negative; every limit of force was on the wrong side until now\n"
+            "  but if these weights pulled at the cell, where a pad presses it: write nothing, and load it that way"
+        )
     return out

@@ -11,6 +11,7 @@ import drivers
 from bench.config import Bench
 from bench.daily.open_bench import OpenBench
 from bench.errors import InputError, Refused, Stopped
+from bench.run.in_use import using
 from bench.run.loop import Script
 from bench.run.rig import Rig, open_rig
 from drivers.clock import WallClock
@@ -126,8 +127,14 @@ def _line(work: OpenBench, step_mm: float) -> str:
 def release(bench: Bench) -> dict[str, Any]:
     """Bring the motor to a state without force, read back. Needs no load cell: it may be what is broken.
 
-    Raises `InputError` where the motor cannot be reached, `Stopped` where nobody can say that it let go.
+    Raises `InputError` where the motor cannot be reached, `Refused` where another process uses it, `Stopped` where
+    nobody can say that it let go.
     """
+    with using([bench.motor.port]):
+        return _let_go(bench)
+
+
+def _let_go(bench: Bench) -> dict[str, Any]:
     try:
         motor, links, rig = _motor_alone(bench)
     except DriverError as error:

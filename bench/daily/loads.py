@@ -71,20 +71,10 @@ def read_loads(work: OpenBench, loads: Sequence[float], seconds: float, ask: Ask
 
 
 def _read(work: OpenBench, load_N: float, seconds: float) -> Script[Reading]:
-    cell, loop = work.rig.load_cell, work.loop
     try:
-        if loop.last_force is None:
-            yield from loop.perform_on(cell.connect(), cell.link)
-        yield from loop.perform_on(cell.start(), cell.link)
-        loop.begin_measuring()
-        yield from loop.sleep(SETTLE_S)
-        work.notebook.clear()
-        yield from loop.sleep(seconds)
-        loop.end_measuring()
-        yield from loop.perform_on(cell.stop(), cell.link)
+        _, channel = yield from work.listen(seconds, SETTLE_S)
     except DriverError as error:
         raise InputError(work.bench.place((error.device,)), str(error)) from error
-    channel = work.notebook.force_channel()
     if channel.flagged.any():
         raise Refused(f"the load cell reports overload under {load_N:.4g} N; take the weight off")
     if channel.gross_N.size < 8:

@@ -11,12 +11,16 @@ from bench.daily.open_bench import OpenBench
 from bench.rates import force_rate_Hz
 from bench.run.loop import Script
 from drivers.errors import DriverError
-from drivers.motor import MotorSample
+from drivers.motor import Motor, MotorIdentity, MotorSample
+from drivers.registers import RegisterMotor
 from drivers.wire import Exchange, Steps
 
 LOOK_S = 1.0
 READS = 20
 READ_EVERY_S = 0.02
+SERVO_BIT = "servo_on"
+"""What a register map calls the bit that says so, as the shipped ones do."""
+
 SLOW_SHARE = 0.9
 """A cell that delivers less than this share of what its line can carry is remarked on."""
 
@@ -77,6 +81,7 @@ def _look_at_motor(work: OpenBench, found: Status) -> Script[None]:
         "model": identity.model,
         **identity.details,
         "homed": homed,
+        "energised": _energised(motor, identity),
         "position_mm": last.position_mm,
         "moved_mm": moved_mm,
         "in_limits": lowest <= last.position_mm <= highest,
@@ -100,21 +105,20 @@ def _look_at_motor(work: OpenBench, found: Status) -> Script[None]:
         )
 
 
+def _energised(motor: Motor, identity: MotorIdentity) -> bool | None:
+    """Whether the motor holds its place by force, from what connecting to it has told; None where it does not tell."""
+    if isinstance(motor, RegisterMotor) and SERVO_BIT in motor.map.bits:
+        return SERVO_BIT in identity.details["bits"]
+    told = identity.details.get("energised")
+    return told if isinstance(told, bool) else None
+
+
 def _look_at_cell(work: OpenBench, found: Status) -> Script[None]:
-    cell, loop = work.rig.load_cell, work.loop
     try:
-        identity = yield from loop.perform_on(cell.connect(), cell.link)
-        yield from loop.perform_on(cell.start(), cell.link)
-        loop.begin_measuring()
-        work.notebook.clear()
-        yield from loop.sleep(LOOK_S)
-        loop.end_measuring()
-        yield from loop.perform_on(cell.stop(), cell.link)
+        identity, channel = yield from work.listen(LOOK_S)
     except DriverError as error:
-        loop.end_measuring()
         found.problems.append(str(error))
         return
-    channel = work.notebook.force_channel()
     force = channel.gross_N
     if force.size < 2:
         found.problems.append(f"load_cell: {force.size} readings in {LOOK_S:g} s; check its rate and mode")
@@ -157,7 +161,8 @@ def words(found: Status) -> list[str]:
         force = f", it feels {motor['force_N']:+.2f} N" if motor["force_N"] is not None else ""
         faults = f"FAULT {', '.join(motor['faults'])}" if motor["faults"] else "no fault"
         homed = "homed" if motor["homed"] else "NOT homed"
-        lines.append(f"motor      {motor['model']}, {homed}, at {motor['position_mm']:.3f} mm{force}, {faults}")
+        power = {True: ", ENERGISED", False: ", not energised", None: ""}[motor["energised"]]
+        lines.append(f"motor      {motor['model']}{power}, {homed}, at {motor['position_mm']:.3f} mm{force}, {faults}")
         lines.append(f"           answers in {motor['answer_ms']:.1f} ms ({motor['slowest_answer_ms']:.1f} at most)")
     if cell:
         lines.append(
@@ -170,4 +175,4 @@ def words(found: Status) -> list[str]:
         )
     lines += [f"note       {remark}" for remark in found.remarks]
     lines += [f"problem    {problem}" for problem in found.problems]
-    return [*lines, "nothing was moved, nothing energised" + ("" if found.problems else "; all is well")]
+    return [*lines, "nothing was moved, nothing switched on" + ("" if found.problems else "; all is well")]

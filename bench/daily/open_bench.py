@@ -16,6 +16,7 @@ from bench.errors import InputError, PadbenchError, Refused, Stopped
 from bench.plan import plan
 from bench.protocol import DepthStep, Finish, Protocol
 from bench.rates import motor_rate_Hz
+from bench.recording.types import ForceChannel
 from bench.run.axis import Axis
 from bench.run.loop import Loop, Script
 from bench.run.motion import Mover, Shape
@@ -26,6 +27,7 @@ from bench.run.script import Run
 from bench.run.signals import Operator, listening
 from bench.run.touchoff import warm_up
 from drivers.errors import DriverError
+from drivers.loadcell import LoadCellIdentity
 
 T = TypeVar("T")
 
@@ -39,7 +41,7 @@ BASELINE_S = 0.3
 class OpenBench:
     """Devices, loop and limits. A context manager; closing closes the ports and says nothing to the devices.
 
-    Raises `InputError` where a port cannot be opened.
+    Raises `InputError` where a port cannot be opened, `Refused` where another process uses it.
     """
 
     def __init__(self, bench: Bench) -> None:
@@ -60,6 +62,7 @@ class OpenBench:
         self.run = Run(self.loop, protocol, bench, planned)
         self.mover = Mover(self.loop, Shape(min(GENTLE_MM_S2, limits.acceleration)))
         self.clock = self.rig.clock
+        self._cell: LoadCellIdentity | None = None
 
     @property
     def virtual(self) -> bool:
@@ -76,6 +79,27 @@ class OpenBench:
                 return self.loop.run(self._while_wanted(script))
         finally:
             self.loop.monitor.stopping = False
+
+    def listen(self, seconds: float, settle_s: float = 0.0) -> Script[tuple[LoadCellIdentity, ForceChannel]]:
+        """Start the load cell, hear it for so long (after `settle_s` that do not count), and stop it again.
+
+        Returns who it is and what it said. Raises its `DriverError`.
+        """
+        cell, loop = self.rig.load_cell, self.loop
+        try:
+            if self._cell is None:
+                self._cell = yield from loop.perform_on(cell.connect(), cell.link)
+            yield from loop.perform_on(cell.start(), cell.link)
+            loop.begin_measuring()
+            yield from loop.sleep(settle_s)
+            self.notebook.clear()
+            yield from loop.sleep(seconds)
+            loop.end_measuring()
+            yield from loop.perform_on(cell.stop(), cell.link)
+        except DriverError:
+            loop.end_measuring()
+            raise
+        return self._cell, self.notebook.force_channel()
 
     def _while_wanted(self, script: Script[T]) -> Script[T]:
         """The script, ended by the operator's stop, which a monitor that ends nothing would pass over."""
@@ -125,6 +149,8 @@ class OpenBench:
                 not_safe = self._wind_down(str(error))
                 if not_safe:
                     raise Stopped(f"{error}\n  {not_safe}") from error
+                if isinstance(error, Stopped):
+                    raise Stopped(f"{error}{self._left_in()}") from error
                 raise
 
     def _wind_down(self, cause: str) -> str:
@@ -139,6 +165,14 @@ class OpenBench:
             return f"NOT SAFE: {error}; use the emergency stop"
         found = self.run.found.not_safe
         return f"NOT SAFE: the safe state could not be read back: {found}; use the emergency stop" if found else ""
+
+    def _left_in(self) -> str:
+        """Where a motor that was stopped is now, as it was read back: a line for a person, or nothing."""
+        found = self.run.found.safe_state
+        if not found:
+            return ""
+        at = f", at {found['position_mm']:.3f} mm" if found.get("position_mm") is not None else ""
+        return f"\n  the axis is in its safe state, {found.get('state', '?')}{at}"
 
     def _must_be_homed(self) -> Script[None]:
         motor = self.rig.motor

@@ -17,10 +17,10 @@ from typing import Protocol as Shape
 
 from bench.daily.series_file import Pad, Series, folder_name
 from bench.daily.series_state import PadState, State, Turn
-from bench.errors import InputError
+from bench.errors import InputError, Refused
 from bench.preflight import Preflight
 from bench.protocol import Protocol
-from bench.recording.unfinished import left_behind, notice
+from bench.recording.unfinished import left_behind, must_be_idle, notice
 from bench.run.folder import discard
 from bench.run.runner import Notes, Outcome, run_protocol
 
@@ -135,6 +135,8 @@ def _turn(
     if bench.all_simulated and bench.simulation is not None:  # another pad: another surface, other noise
         simulation = bench.simulation.model_copy(update={"seed": bench.simulation.seed + number - 1})
         bench = bench.model_copy(update={"simulation": simulation})
+    if not bench.all_simulated:
+        must_be_idle(series.out, bench.name)
     left = left_behind(series.out, bench.name) if not bench.all_simulated else None
     if left is not None:
         person.say(notice(left))
@@ -155,7 +157,7 @@ def _turn(
                 planned_s=preflight.duration_s + preflight.approach_s,
                 left=left,
             )
-    except InputError:
+    except (InputError, Refused):
         discard(where)
         raise
     cause = outcome.cause or ""

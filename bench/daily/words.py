@@ -77,16 +77,29 @@ def asked(question: str) -> str:
     The question goes to standard error: with `--json -` nothing else may be on standard output.
     """
     print(question, end=" ", file=sys.stderr, flush=True)
-    line = sys.stdin.readline()
+    try:
+        line = sys.stdin.readline()
+    except KeyboardInterrupt:
+        print(file=sys.stderr)  # what is said next begins a line of its own
+        raise
     if not line:
         print(file=sys.stderr)
         raise Refused("nobody answers: standard input has ended\n  answer at a terminal, or say --yes")
     return line.strip()
 
 
-def agreed(question: str, *, yes: bool) -> bool:
-    """Whether the person says yes; `yes`: it was said on the command line."""
-    return yes or asked(f"{question} [y/N]").lower() in ("y", "yes")
+def agreed(question: str, *, yes: bool, must_say: bool = False) -> bool:
+    """Whether the person says yes; `yes`: it was said on the command line.
+
+    Enter is no, but where a no would be believed (`must_say`); what is neither is asked again.
+    """
+    if yes:
+        return True
+    known = {"y": True, "yes": True, "n": False, "no": False, **({} if must_say else {"": False})}
+    while True:
+        answer = asked(f"{question} [y/n]" if must_say else f"{question} [y/N]").lower()
+        if answer in known:
+            return known[answer]
 
 
 def positive(name: str, value: float, most: float, unit: str, cure: str) -> float:

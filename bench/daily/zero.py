@@ -49,18 +49,10 @@ def read_zero(work: OpenBench, seconds: float) -> dict[str, Any]:
 
 
 def _read(work: OpenBench, seconds: float) -> Script[tuple[np.ndarray, np.ndarray, dict[str, Any]]]:
-    cell, loop = work.rig.load_cell, work.loop
     try:
-        yield from loop.perform_on(cell.connect(), cell.link)
-        yield from loop.perform_on(cell.start(), cell.link)
-        loop.begin_measuring()
-        work.notebook.clear()
-        yield from loop.sleep(seconds)
-        loop.end_measuring()
-        yield from loop.perform_on(cell.stop(), cell.link)
+        _, channel = yield from work.listen(seconds)
     except DriverError as error:
         raise InputError(work.bench.place((error.device,)), str(error)) from error
-    channel = work.notebook.force_channel()
     return channel.gross_N, channel.time_s, {"overloaded": int(channel.flagged.sum())}
 
 

@@ -1,14 +1,15 @@
-"""Messages on their way into a chunk, as bytes of the format at once.
+"""Messages on their way into a chunk, and the chunk, as bytes of the format at once.
 
-A run writes a message at every sample. The library's writer makes one field by field, in 3.6 µs; this takes 0.7.
-Format: https://mcap.dev/spec (Message, Message Index).
+A run writes a message at every sample and a chunk every 40 ms. The library's writer makes a message field by field, in
+3.6 µs; this takes 0.7. Format: https://mcap.dev/spec (Message, Chunk, Message Index, Chunk Index).
 """
 
 from __future__ import annotations
 
 import struct
+import zlib
 
-import numpy as np
+import zstandard
 from mcap.opcode import Opcode
 
 _MESSAGE = struct.Struct("<BQHIQQ")
@@ -24,6 +25,22 @@ _INDEX = struct.Struct("<BQHI")
 """Opcode, length of the rest, channel id, bytes of entries; the entries follow."""
 
 _OPCODE = int(Opcode.MESSAGE)
+
+_ZSTD = struct.pack("<I", 4) + b"zstd"
+
+_CHUNK = struct.Struct(f"<BQQQQI{len(_ZSTD)}sQ")
+"""Opcode, length of the rest, first and last log time, size and checksum before compression, compression, size of the
+records; these follow."""
+
+_CHUNK_INDEX = struct.Struct("<BQQQQQI")
+"""Opcode, length of the rest, first and last log time, offset and length of the chunk, bytes of the map; the map of
+channel id to the offset of its message index follows, and then:"""
+
+_PLACE = struct.Struct("<HQ")
+_CHUNK_INDEX_END = struct.Struct(f"<Q{len(_ZSTD)}sQQ")
+"""Bytes of all message indices, compression, size of the records as they are and before compression."""
+
+_CHUNK_INDEX_SIZE = _CHUNK_INDEX.size - 9 + _CHUNK_INDEX_END.size
 
 
 class ChunkBuffer:
@@ -55,18 +72,34 @@ class ChunkBuffer:
 
     def span_ns(self) -> tuple[int, int]:
         """First and last log time; there must be a message."""
-        times = [np.frombuffer(bytes(entries), "<u8")[::2] for entries in self._entries.values()]
-        return min(int(t.min()) for t in times), max(int(t.max()) for t in times)
+        times = [struct.unpack(f"<{len(entries) // 8}Q", entries)[::2] for entries in self._entries.values()]
+        return min(map(min, times)), max(map(max, times))
 
-    def index_records(self) -> tuple[bytes, dict[int, int]]:
-        """The message index records that follow the chunk, and each channel's offset among them."""
-        records = bytearray()
-        offsets: dict[int, int] = {}
+    def records(
+        self, offset: int, span_ns: tuple[int, int], compressor: zstandard.ZstdCompressor
+    ) -> tuple[bytes, bytes, bytes]:
+        """The chunk that is to stand at `offset`, the message indices behind it, and its index for the summary.
+
+        `span_ns` is what the method of that name says.
+        """
+        first_ns, last_ns = span_ns
+        packed = compressor.compress(self.data)
+        size, plain = _CHUNK.size + len(packed), len(self.data)
+        head = _CHUNK.pack(
+            int(Opcode.CHUNK), size - 9, first_ns, last_ns, plain, zlib.crc32(self.data), _ZSTD, len(packed)
+        )
+        index, places = bytearray(), bytearray()
         for channel_id, entries in self._entries.items():
-            offsets[channel_id] = len(records)
-            records += _INDEX.pack(int(Opcode.MESSAGE_INDEX), 6 + len(entries), channel_id, len(entries))
-            records += entries
-        return bytes(records), offsets
+            places += _PLACE.pack(channel_id, offset + size + len(index))
+            index += _INDEX.pack(int(Opcode.MESSAGE_INDEX), 6 + len(entries), channel_id, len(entries))
+            index += entries
+        length = _CHUNK_INDEX_SIZE + len(places)
+        in_summary = (
+            _CHUNK_INDEX.pack(int(Opcode.CHUNK_INDEX), length, first_ns, last_ns, offset, size, len(places))
+            + places
+            + _CHUNK_INDEX_END.pack(len(index), _ZSTD, len(packed), plain)
+        )
+        return head + packed, bytes(index), in_summary
 
     def clear(self) -> None:
         """Begin the next chunk."""

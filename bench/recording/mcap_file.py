@@ -20,8 +20,10 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from bench.errors import InputError
+from bench.recording.lock import hold
 from bench.recording.mcap_chunk import ChunkBuffer
 from bench.recording.schemas import LIBRARY, Topic
+from bench.recording.spool import Spool
 
 CHUNK_SIZE = 128 * 1024
 """Bytes before compression; what a torn or damaged chunk costs at most. A run flushes long before that."""
@@ -40,12 +42,15 @@ class McapFile:
 
     def __init__(self, path: Path, topics: Iterable[Topic], epoch_ns: int) -> None:
         self._stream = path.open("wb", buffering=0)
+        hold(self._stream.fileno())  # as long as it is written: a file that ends early and is not held was cut off
         self._size = 0  # bytes that the operating system has
         self._out = bytearray()  # whole records on their way to it
         self._chunk = ChunkBuffer()
         self._schemas: list[records.Schema] = []
         self._channels: list[records.Channel] = []
-        self._chunk_indices: list[records.ChunkIndex] = []
+        self._compressor = zstandard.ZstdCompressor()
+        self._chunk_count = 0
+        self._chunk_indices = Spool(path.parent)  # 25 a second: the one part of the summary that grows with the run
         self._attachments: list[records.AttachmentIndex] = []
         self._metadata: list[records.MetadataIndex] = []
         self._counts: Counter[int] = Counter()
@@ -57,7 +62,7 @@ class McapFile:
         try:
             self._hand_over()
         except OSError:
-            self._stream.close()
+            self._close()
             raise
 
     def _define(self, topic: Topic, epoch_ns: int) -> None:
@@ -125,11 +130,15 @@ class McapFile:
         self._out += MCAP0_MAGIC
         self._hand_over()
         self.sync()
-        self._stream.close()
+        self._close()
 
     def abandon(self) -> None:
         """Close without index, after the disk refused bytes; what is on it stays readable."""
+        self._close()
+
+    def _close(self) -> None:
         self._stream.close()
+        self._chunk_indices.close()
 
     # -- inside ------------------------------------------------------------------------------------------------
 
@@ -162,34 +171,13 @@ class McapFile:
         chunk = self._chunk
         if chunk.empty:
             return
-        data = bytes(chunk.data)
         first_ns, last_ns = chunk.span_ns()
-        packed = zstandard.compress(data)
-        offset, size = self._write(
-            records.Chunk(
-                compression="zstd",
-                data=packed,
-                message_start_time=first_ns,
-                message_end_time=last_ns,
-                uncompressed_crc=zlib.crc32(data),
-                uncompressed_size=len(data),
-            )
-        )
-        index, offsets = chunk.index_records()
+        offset = self._size + len(self._out)
+        record, index, index_record = chunk.records(offset, (first_ns, last_ns), self._compressor)
+        self._out += record
         self._out += index
-        self._chunk_indices.append(
-            records.ChunkIndex(
-                message_start_time=first_ns,
-                message_end_time=last_ns,
-                chunk_start_offset=offset,
-                chunk_length=size,
-                message_index_offsets={channel: offset + size + at for channel, at in offsets.items()},
-                message_index_length=len(index),
-                compression="zstd",
-                compressed_size=len(packed),
-                uncompressed_size=len(data),
-            )
-        )
+        self._chunk_indices.append(index_record)
+        self._chunk_count += 1
         self._counts.update(chunk.counts())
         before = self._span_ns or (first_ns, last_ns)
         self._span_ns = (min(before[0], first_ns), max(before[1], last_ns))
@@ -202,35 +190,41 @@ class McapFile:
             attachment_count=len(self._attachments),
             channel_count=len(self._channels),
             channel_message_counts=self._counts,
-            chunk_count=len(self._chunk_indices),
+            chunk_count=self._chunk_count,
             message_count=self._counts.total(),
             message_end_time=last_ns,
             message_start_time=first_ns,
             metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )
-        groups: tuple[tuple[Opcode, Iterable[records.McapRecord]], ...] = (
-            (Opcode.SCHEMA, self._schemas),
-            (Opcode.CHANNEL, self._channels),
-            (Opcode.STATISTICS, [statistics]),
-            (Opcode.CHUNK_INDEX, self._chunk_indices),
-            (Opcode.ATTACHMENT_INDEX, self._attachments),
-            (Opcode.METADATA_INDEX, self._metadata),
+
+        def packed(group: Iterable[records.McapRecord]) -> Iterable[bytes]:
+            return (_bytes(record) for record in group)
+
+        groups: tuple[tuple[Opcode, Iterable[bytes]], ...] = (
+            (Opcode.SCHEMA, packed(self._schemas)),
+            (Opcode.CHANNEL, packed(self._channels)),
+            (Opcode.STATISTICS, packed([statistics])),
+            (Opcode.CHUNK_INDEX, self._chunk_indices.pieces()),
+            (Opcode.ATTACHMENT_INDEX, packed(self._attachments)),
+            (Opcode.METADATA_INDEX, packed(self._metadata)),
         )
-        start = self._size + len(self._out)
-        summary = bytearray()
+        start = at = self._size + len(self._out)
+        checksum = 0
         offsets = bytearray()
         for opcode, group in groups:
-            begin = len(summary)
-            for record in group:
-                summary += _bytes(record)
-            place = records.SummaryOffset(opcode, group_start=start + begin, group_length=len(summary) - begin)
-            offsets += _bytes(place)
-        offset_start = start + len(summary)
-        summary += offsets
-        footer = records.Footer(summary_start=start, summary_offset_start=offset_start, summary_crc=0)
-        footer.summary_crc = zlib.crc32(_bytes(footer)[: 9 + _FOOTER_SIZE - 4], zlib.crc32(summary))
-        self._out += summary
+            begin = at
+            for piece in group:
+                checksum = zlib.crc32(piece, checksum)
+                self._out += piece
+                at += len(piece)
+                if len(self._out) > CHUNK_SIZE:
+                    self._hand_over()
+            offsets += _bytes(records.SummaryOffset(opcode, group_start=begin, group_length=at - begin))
+        footer = records.Footer(summary_start=start, summary_offset_start=at, summary_crc=0)
+        checksum = zlib.crc32(offsets, checksum)
+        footer.summary_crc = zlib.crc32(_bytes(footer)[: 9 + _FOOTER_SIZE - 4], checksum)
+        self._out += offsets
         self._write(footer)
 
 

@@ -209,7 +209,7 @@ class _Reading:
 
     def _seconds(self, column: _Column, stamps: str) -> Array:
         assert self.epoch_ns is not None
-        parts = column.parts.get(stamps)
+        parts = column.parts.pop(stamps, None)  # one of the two is enough in memory
         if not parts:
             return np.empty(0)
         ns: Array = (np.concatenate(parts) - self.epoch_ns) / 1e9
@@ -320,7 +320,7 @@ def _one_by_one(column: _Column) -> list[dict[str, Any]]:
 
 
 def _array(column: _Column, key: str) -> Array:
-    parts = column.parts.get(key)
+    parts = column.parts.pop(key, None)
     return np.concatenate(parts) if parts else np.empty(0)
 
 

@@ -8,13 +8,15 @@ from __future__ import annotations
 import mmap
 import struct
 import zlib
-from bisect import bisect_right
+from array import array
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any, cast
 
 import lz4.frame  # type: ignore[import-untyped]  # comes with mcap, without types
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -44,6 +46,13 @@ _MESSAGE = struct.Struct("<BQHIQQ")
 CHUNK_HEAD = struct.Struct("<QQQII")
 """Start time, end time, uncompressed size, uncompressed CRC, length of the compression's name."""
 
+_CHUNK_INDEX_HEAD = struct.Struct("<QQQQ")
+"""Start time, end time, offset and length of the chunk; the rest is not needed here."""
+
+_PLACE = struct.Struct("<QQ")
+"""Offset and length of a metadata record or an attachment, at the head of its index."""
+
+_PIECE = 1 << 20
 _FOOTER_SIZE = 20
 _MAX_UNCOMPRESSED = 1 << 27
 """A chunk that says it is larger is not unpacked: writers make chunks of some megabytes."""
@@ -228,22 +237,51 @@ def definitions(block: Block) -> Iterator[Schema | Channel]:
 
 @dataclass
 class Index:
-    """What a finished file's summary says: offset → (opcode, length of the record), schemas and channels."""
+    """What a finished file's summary says: which record begins where, and how long it is; schemas and channels.
+
+    Plain arrays: a day of recording has two million chunks.
+    """
 
     summary: int
-    known: dict[int, tuple[int, int]] = field(default_factory=dict)
     definitions: list[Schema | Channel] = field(default_factory=list)
-    order: list[int] = field(default_factory=list)
+    begins: array[int] = field(default_factory=lambda: array("Q"))
+    opcodes: array[int] = field(default_factory=lambda: array("B"))
+    lengths: array[int] = field(default_factory=lambda: array("Q"))
+
+    def add(self, begin: int, opcode: int, length: int) -> None:
+        """A record at an offset; `settle` follows the last one."""
+        self.begins.append(begin)
+        self.opcodes.append(opcode)
+        self.lengths.append(length)
+
+    def settle(self) -> None:
+        """Into the order of the file; of two records at one offset the one that was told last counts."""
+        begins = np.array(self.begins, dtype=np.uint64)
+        order = np.argsort(begins, kind="stable")
+        last = np.append(np.diff(begins[order]) != 0, [True] * bool(begins.size))
+        places = order[last]
+        for name in ("begins", "opcodes", "lengths"):
+            values = getattr(self, name)
+            setattr(self, name, array(values.typecode, np.array(values)[places].tobytes()))
+
+    def at(self, begin: int) -> tuple[int, int] | None:
+        """Opcode and length of the record that is known to begin there."""
+        k = bisect_left(self.begins, begin)
+        return (self.opcodes[k], self.lengths[k]) if k < len(self.begins) and self.begins[k] == begin else None
+
+    def of_kind(self, opcode: int) -> Iterator[tuple[int, int]]:
+        """Offset and length of each known record of a kind."""
+        return ((self.begins[k], self.lengths[k]) for k, kind in enumerate(self.opcodes) if kind == opcode)
 
     @property
     def has_chunks(self) -> bool:
         """Messages stand in chunks, and the index knows them."""
-        return any(opcode == Opcode.CHUNK for opcode, _ in self.known.values())
+        return int(Opcode.CHUNK) in self.opcodes
 
     def next_after(self, position: int) -> int:
         """The next record that is known to begin behind `position`; the summary after the last."""
-        at = bisect_right(self.order, position)
-        return self.order[at] if at < len(self.order) else self.summary
+        at = bisect_right(self.begins, position)
+        return self.begins[at] if at < len(self.begins) else self.summary
 
 
 def read_index(data: Buffer) -> Index | None:
@@ -254,15 +292,22 @@ def read_index(data: Buffer) -> Index | None:
     opcode, length, summary, _, crc = struct.unpack_from("<BQQQI", data, foot)
     if opcode != Opcode.FOOTER or length != _FOOTER_SIZE or not len(MAGIC) <= summary < foot:
         return None
-    if crc == 0 or zlib.crc32(data[summary : foot + RECORD.size + 16]) != crc:
+    if crc == 0 or _checksum(data, summary, foot + RECORD.size + 16) != crc:
         return None
     index = Index(summary)
     try:
         _fill(index, data, foot)
+        index.settle()
     except Exception:  # as in `parse`: a summary that matches its checksum may still be nonsense
         return None
-    index.order = sorted(index.known)
     return index
+
+
+def _checksum(data: Buffer, begin: int, end: int) -> int:
+    found = 0
+    for at in range(begin, end, _PIECE):
+        found = zlib.crc32(data[at : min(at + _PIECE, end)], found)
+    return found
 
 
 def _fill(index: Index, data: Buffer, foot: int) -> None:
@@ -272,14 +317,13 @@ def _fill(index: Index, data: Buffer, foot: int) -> None:
         opcode, length = RECORD.unpack_from(data, position)
         end = position + RECORD.size + length
         body = data[position + RECORD.size : end]
-        stream = ReadDataStream(BytesIO(body))
         if opcode == Opcode.CHUNK_INDEX:
-            chunk = ChunkIndex.read(stream)
-            index.known[chunk.chunk_start_offset] = (int(Opcode.CHUNK), chunk.chunk_length)
+            _, _, begin, size = _CHUNK_INDEX_HEAD.unpack_from(body)
+            index.add(begin, int(Opcode.CHUNK), size)
         elif opcode in (Opcode.METADATA_INDEX, Opcode.ATTACHMENT_INDEX):
             kind = Opcode.METADATA if opcode == Opcode.METADATA_INDEX else Opcode.ATTACHMENT
-            offset, size = stream.read8(), stream.read8()
-            index.known[offset] = (int(kind), size)
+            begin, size = _PLACE.unpack_from(body)
+            index.add(begin, int(kind), size)
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             found = parse(opcode, body)
             assert isinstance(found, Schema | Channel)

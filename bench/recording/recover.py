@@ -18,6 +18,7 @@ from bench.recording.reader import recording_file
 from bench.recording.records import Block, Found, definitions, messages
 from bench.recording.scan import Damage, Scan
 from bench.recording.schemas import LIBRARY, RECOVERED, RESULT, RUN, TOPICS, epoch_of
+from bench.recording.unfinished import being_written
 
 
 @dataclass
@@ -84,9 +85,14 @@ def recover(path: str | Path, out: str | Path | None = None) -> tuple[Path, Reco
     """Rewrite an MCAP file with index and checksums; what is intact is kept record for record, in its order.
 
     `path` may be a run folder. `out` is NAME.recovered.mcap beside it unless given. Works on any MCAP file, whoever
-    wrote it. Raises `InputError` where nothing can be read, or where input and output are the same file.
+    wrote it. Raises `InputError` where nothing can be read, where input and output are the same file, or where the
+    input is still being written.
     """
     source = recording_file(Path(path))
+    writer = being_written(source)
+    if writer is not None:
+        cure = "wait for the end of the run; what is in it by now can be read as it is (padbench convert, fit)"
+        raise InputError(str(source), f"is being written: the run is going on{writer}", cure)
     target = Path(out) if out is not None else source.with_name(f"{source.stem}.recovered.mcap")
     draft = target.with_name(f".recovering-{os.getpid()}")
     try:

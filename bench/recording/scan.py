@@ -115,9 +115,9 @@ class Scan:
 
     def _frame(self, position: int, index: Index | None) -> tuple[int, int]:
         """Kind and end of the record at `position`; the index knows better than the record's own head."""
-        if index is not None and position in index.known:
-            opcode, length = index.known[position]
-            return opcode, position + length
+        told = index.at(position) if index is not None else None
+        if told is not None:
+            return told[0], position + told[1]
         if len(self.data) - position < RECORD.size:
             raise Damaged("the file ends within a record", whole=False)
         opcode, length = RECORD.unpack_from(self.data, position)
@@ -150,7 +150,7 @@ class Scan:
         """Where the walk goes on after trouble at `position`, and the chunk found on the way; notes what is lost."""
         if index is not None:
             resume = index.next_after(position)
-            content = position in index.known or not index.has_chunks
+            content = index.at(position) is not None or not index.has_chunks
             self.damage.append(Damage(position, resume - position, what, content))
             return resume, None
         found = search.after(position)

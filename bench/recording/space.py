@@ -10,8 +10,11 @@ from bench.errors import InputError
 RESERVE = 32 << 20
 """Bytes that a recording leaves free: the motion must still end, and model, fit and report be written."""
 
-SAMPLE_SIZE = 80
-"""Bytes a sample takes in the file at most: 36 to 60 were measured, index included."""
+SAMPLE_SIZE = 70
+"""Bytes a sample takes in the file at most: 30 to 60 were measured."""
+
+CHUNK_COST, CHUNKS_PER_S = 340, 25
+"""And what each chunk takes beside its samples, with its place in the index; slow devices fill them with little."""
 
 UNTOLD_S = 600.0
 UNTOLD_PER_S = 2000.0
@@ -30,7 +33,8 @@ def need_bytes(planned_s: float | None, samples_per_s: float | None) -> int:
     """Bytes that a run of so many seconds takes, both devices' samples together, with the reserve."""
     seconds = UNTOLD_S if planned_s is None else planned_s
     rate = UNTOLD_PER_S if samples_per_s is None else samples_per_s
-    return RESERVE + round(max(0.0, seconds) * max(0.0, rate) * SAMPLE_SIZE)
+    per_s = max(0.0, rate) * SAMPLE_SIZE + min(max(0.0, rate), CHUNKS_PER_S) * CHUNK_COST
+    return RESERVE + round(max(0.0, seconds) * per_s)
 
 
 def must_fit(folder: Path, need: int) -> None:

@@ -7,6 +7,7 @@ reader can tell how many samples are missing.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -121,7 +122,7 @@ class Recorder:
             if block is not None:
                 truth["bench_file_block"] = block
         self._store.metadata(RUN, strings({"format": FORMAT, "epoch_ns": str(self._epoch_ns), **run}))
-        self._store.metadata(HOST, _padded(strings(host)))
+        self._store.metadata(HOST, _padded(strings({"process": os.getpid(), **host})))
         if truth:
             self._store.metadata(SIMULATION, strings(truth))
         for name, content in files.items():

@@ -124,6 +124,7 @@ class Axis:
         self._steps: Steps[Any] | None = None
         self._item: Exchange[Any] | Pause | None = None
         self._pause_until_s = 0.0
+        self._taken_s = 0.0
         self.failures: list[DriverError] = []
         self.told: list[tuple[float, str, dict[str, float]]] = []
         """Moves that a move motor has taken, and halts: time, name, numbers; for whoever records."""
@@ -145,6 +146,15 @@ class Axis:
         if self.motor.kind == "stream":
             return 0.0
         return abs(self.command(time_s) - self.command(time_s - 2.5 * self.period_s))
+
+    def over_s(self, time_s: float) -> float:
+        """For how long a move motor has had to be where it was sent: since its profile was over, and all of it told.
+
+        0 while it is under way, and for a stream, whose every position is judged by what was commanded just then.
+        """
+        if self.motor.kind == "stream" or self._steps is not None or self._goal_mm != self._curve.end_mm:
+            return 0.0
+        return max(0.0, time_s - max(self._start_s + self._curve.duration_s, self._taken_s))
 
     def velocity(self, now_s: float) -> float:
         """The velocity commanded at a time, mm/s."""
@@ -345,6 +355,7 @@ class Axis:
         except StopIteration:
             self._steps = None
             self._item = None
+            self._taken_s = now_s
             self._note_taken(now_s)
             return
         except DriverError as failure:

@@ -256,7 +256,7 @@ class Loop:
         for reading, command in axis.collect():
             sink.motor(reading.time_s, reading.received_s, reading.position_mm, command, reading.force_N)
             names = self.rig.motor.fault_names(reading.fault) if reading.fault else ()
-            monitor.motor(reading, command, names, axis.lag_mm(reading.time_s))
+            monitor.motor(reading, command, names, axis.lag_mm(reading.time_s), axis.over_s(reading.time_s))
             self.last_motor = reading
             self.motor_count += 1
             if self.foresight is not None:

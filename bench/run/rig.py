@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import drivers
+from bench.run.in_use import COMMAND, using
 from drivers.clock import WallClock
 from drivers.loadcell import LoadCell
 from drivers.motor import Motor
@@ -27,6 +29,8 @@ class Rig:
     world: World | None = None
     links: list[Link] = field(default_factory=list)
     ports: list[Port] = field(default_factory=list)
+    held: ExitStack = field(default_factory=ExitStack)
+    """That this process, and no other, uses the ports."""
 
     def complete(self, steps: Steps[T], link: Link) -> T:
         """Run a conversation to its end while the other link is serviced too."""
@@ -42,6 +46,7 @@ class Rig:
         """Close both ports; says nothing to the devices."""
         for link in self.links:
             link.close()
+        self.held.close()
 
     def __enter__(self) -> Rig:
         return self
@@ -57,11 +62,19 @@ def is_simulated(bench: Bench) -> bool:
     return all(port.startswith("sim://") for port in (bench.motor.port, bench.load_cell.port))
 
 
-def open_rig(bench: Bench) -> Rig:
-    """Open both devices of a bench.
+def open_rig(bench: Bench, what: str = COMMAND) -> Rig:
+    """Open both devices of a bench; `what` is told to whoever wants them meanwhile.
 
-    Raises `drivers.errors.PortError` where a port cannot be opened.
+    Raises `drivers.errors.PortError` where a port cannot be opened, `Refused` where another process uses it.
     """
+    with ExitStack() as held:
+        held.enter_context(using((bench.motor.port, bench.load_cell.port), what))
+        rig = _open(bench)
+        rig.held = held.pop_all()
+    return rig
+
+
+def _open(bench: Bench) -> Rig:
     world = None
     clock: Clock
     if any(port.startswith("sim://") for port in (bench.motor.port, bench.load_cell.port)):

@@ -91,7 +91,7 @@ def run_protocol(
     """
     bench = _as_sampled(bench, protocol)
     try:
-        rig = open_rig(bench)
+        rig = open_rig(bench, f"the run {folder.resolve()}")
     except DriverError as error:
         raise InputError(bench.place((error.device, "port")), f"{error.device}: {error.message}") from error
     warm_up()

@@ -24,6 +24,10 @@ LATE_TURN_S = 0.04
 ZERO_LOST_SHARE = 0.05
 """Air that reads below the tare by that share of the force limit: the tare is not the cell's zero any more."""
 
+ARRIVES_S, ARRIVED_MM = 0.5, 0.1
+"""A controller that makes its own moves is where it was sent so long after the end of the profile, to within its band.
+Its following error says little of that: it allows for a move that begins some messages late."""
+
 SLACK_MM = 0.01
 """How far a measured position may lie beyond a limit that a step goes to: encoder noise and the servo's overshoot."""
 
@@ -137,10 +141,18 @@ class Monitor:
         elif abs(sample.gross_N) > e.gross_N:
             self.violate(f"gross force {sample.gross_N:.3f} N is beyond the {e.gross_N:g} N the cell may carry")
 
-    def motor(self, sample: MotorSample, command_mm: float, fault_names: tuple[str, ...], lag_mm: float = 0.0) -> None:
+    def motor(
+        self,
+        sample: MotorSample,
+        command_mm: float,
+        fault_names: tuple[str, ...],
+        lag_mm: float = 0.0,
+        over_s: float = 0.0,
+    ) -> None:
         """Judge one motor sample against travel, depth, speed, following error and the device's own faults.
 
-        `lag_mm`: how far behind the command the axis may be because nobody knows when it began.
+        `lag_mm`: how far behind the command the axis may be because nobody knows when it began. `over_s`: for how long
+        its move has been over.
         """
         e = self.envelope
         self._newest_motor_s = sample.received_s
@@ -162,6 +174,12 @@ class Monitor:
             self.violate(
                 f"following error: commanded {command_mm:.3f} mm, at {x:.3f} mm, "
                 f"allowed {e.following_error_mm:g} mm apart",
+                "motor",
+            )
+        if self.watch_following and over_s > ARRIVES_S and abs(command_mm - x) > ARRIVED_MM:
+            self.violate(
+                f"the axis did not get where it was sent: {command_mm:.3f} mm, and {over_s:.1f} s after the move it "
+                f"stands at {x:.3f} mm (stuck, too weak, or it does not do what it is told)",
                 "motor",
             )
         self._judge_speed(sample)

@@ -52,6 +52,18 @@ STANDS_S, STAYS_S = 0.15, 0.1
 COMMAND_MM, STILL_MM = 1e-6, 0.015
 """The axis stands for so long before a force is judged, and so long a jump lasts. An encoder's last digit may turn."""
 
+REPEATING_S = 1.0
+"""And for so long where the cell repeats its readings: one that measures ten times a second makes stairs of all that a
+pad does after a ramp."""
+
+EVEN_MM = 2e-3
+"""A command that moves evenly is so near to a line: 0.1 N at most of a sample as stiff as 50 N/mm."""
+
+SURELY = 3.0
+"""So many times as large must a jump be on the move, where noise can hide a slope, or of readings that repeat."""
+
+STOOD, MOVED = "stood still", "moved evenly"
+
 
 class FrozenWatch:
     """Whether a load cell still measures: one that repeats its last reading goes on sending frames.
@@ -185,67 +197,77 @@ def _weight(dt_s: float) -> float:
 
 
 class JumpWatch:
-    """Whether a force jumps, and stays away, while the axis stands: a pad relaxes, it does not jump.
+    """Whether a force jumps, and stays away, while the axis stands or moves evenly: a pad does not jump.
 
     A cable that moved, a setting that somebody changed, a sign, a zero: all within one or two samples. Judged are six
     readings before and six after, by their medians, so that outliers do not count. What goes smoothly (relaxation,
-    drift, slow hum) spreads about as far within the six as it goes from the ones to the others. And what has jumped
-    must stay there for 0.1 s and twelve readings: a knock against the bench does not, nor does what swings.
+    drift, slow hum, a ramp) spreads about as far within the six as it goes from the ones to the others. And what has
+    jumped must stay there for 0.1 s and twelve readings: a knock against the bench does not, nor does what swings.
+
+    What the axis does in between would be a jump as well, as seen by a cell that is slow or late. So it must have
+    stood, or gone along a line, from 0.15 s before the first of these readings until the verdict. While it goes, only a
+    pad that is pressed is judged (touching and letting go are jumps), by a cell that does not repeat its readings.
     """
 
     def __init__(self, least_N: float) -> None:
         self.least_N = least_N
         self._sigma_N = math.nan
-        self._command_mm = self._still_mm = math.nan
-        self._since_s = math.inf
         self._readings: deque[float] = deque(maxlen=2 * SIDE + BETWEEN)
-        self._jumped: tuple[float, float, float] | None = None
+        self._times_s: deque[float] = deque(maxlen=2 * SIDE + BETWEEN)
+        self._motion: deque[tuple[float, float, float]] = deque()
+        self._jumped: tuple[float, float, float, float] | None = None
         self._after = self._back = 0
 
     def in_air(self, sigma_N: float) -> None:
-        """What the noise is; from now on the force is judged."""
+        """What the noise is; from now on the force is judged, from the zero that it has now."""
         self._sigma_N = sigma_N
+        self._begin()
 
     def motor(self, time_s: float, command_mm: float, position_mm: float) -> None:
-        """One position, commanded and measured: whether the axis stands, and since when."""
-        if abs(command_mm - self._command_mm) < COMMAND_MM and abs(position_mm - self._still_mm) < STILL_MM:
-            return
-        self._command_mm, self._still_mm = command_mm, position_mm
-        self._begin(time_s)
+        """One position, commanded and measured."""
+        motion = self._motion
+        motion.append((time_s, command_mm, position_mm))
+        needed_s = self._jumped[3] if self._jumped is not None else self._times_s[0] if self._times_s else time_s
+        while len(motion) > 2 and motion[1][0] <= needed_s - REPEATING_S:
+            motion.popleft()
 
     def cell(self, time_s: float, net_N: float) -> str | None:
         """One net force; the cause where it has jumped."""
-        if math.isnan(self._sigma_N) or time_s - self._since_s < STANDS_S:
+        if math.isnan(self._sigma_N):
             return None
         readings = self._readings
         readings.append(net_N)
+        self._times_s.append(time_s)
         if len(readings) < 2 * SIDE + BETWEEN:
             return None
         if self._jumped is None:
             self._jumped = self._seen(time_s)
             return None
-        at_s, before_N, jump_N = self._jumped
+        at_s, before_N, jump_N, since_s = self._jumped
         self._after += 1
         self._back += abs(net_N - before_N) < 0.5 * abs(jump_N)
         if self._back > max(1.0, BACK_SHARE * self._after):
-            self._begin(time_s)  # it came back, which is no jump either
+            self._begin()  # it came back, which is no jump either
             return None
         if time_s - at_s < STAYS_S or self._after < 2 * SIDE:
             return None
-        self._jumped = None
+        even = self._even(since_s)
+        self._begin()
+        if not even:
+            return None
         return (
-            f"the load cell's reading jumped from {before_N:.3f} to {before_N + jump_N:.3f} N while the axis stood "
-            "still, which no pad does: a cable, a setting, the sign or the zero of the cell has changed"
+            f"the load cell's reading jumped from {before_N:.3f} to {before_N + jump_N:.3f} N while the axis {even}, "
+            "which no pad does: a cable, a setting, the sign or the zero of the cell has changed"
         )
 
-    def _begin(self, time_s: float) -> None:
-        """Look anew, some time from now on."""
-        self._since_s = time_s
+    def _begin(self) -> None:
+        """Look anew."""
         self._readings.clear()
+        self._times_s.clear()
         self._jumped = None
 
-    def _seen(self, time_s: float) -> tuple[float, float, float] | None:
-        """When, from what, by how much: where the readings now at hand have a jump in their middle."""
+    def _seen(self, time_s: float) -> tuple[float, float, float, float] | None:
+        """When, from what, by how much, since when: where the readings now at hand have a jump in their middle."""
         readings = self._readings
         if abs(readings[-1] - readings[0]) <= self._most(readings[0]):
             return None
@@ -259,11 +281,38 @@ class JumpWatch:
         spread_N = max(min(side[-2] - side[0], side[-1] - side[1]) for side in (before, after))
         if abs(jump_N) <= self._most(before_N) or spread_N > SMOOTH * abs(jump_N):
             return None
+        repeats = any(len(set(side)) <= SIDE // 2 for side in (before, after))
+        even = self._even(self._times_s[0], REPEATING_S if repeats else STANDS_S)
+        if even == MOVED and (repeats or before_N <= self._most(before_N)):
+            return None
+        if (even == MOVED or repeats) and abs(jump_N) <= SURELY * self._most(before_N):
+            return None
+        if not even:
+            return None
         self._after = self._back = 0
-        return time_s, before_N, jump_N
+        return time_s, before_N, jump_N, self._times_s[0]
+
+    def _even(self, since_s: float, before_s: float = STANDS_S) -> str:
+        """Whether the axis stood or moved along a line, from so long before a time until now; empty: neither."""
+        since_s -= before_s
+        motion = [sample for sample in self._motion if sample[0] >= since_s]
+        if not motion or self._motion[0][0] > since_s:
+            return ""
+        times_s, commands_mm, positions_mm = np.array(motion).T
+        if np.ptp(commands_mm) <= COMMAND_MM:
+            return STOOD if np.ptp(positions_mm) <= STILL_MM else ""
+        even = _off_a_line(times_s, commands_mm) <= EVEN_MM and _off_a_line(times_s, positions_mm) <= STILL_MM
+        return MOVED if even else ""
 
     def _most(self, force_N: float) -> float:
         return max(JUMP_SIGMAS * self._sigma_N, JUMP_SHARE * abs(force_N), self.least_N)
+
+
+def _off_a_line(times: np.ndarray, values: np.ndarray) -> float:
+    """The farthest of the values from the straight line through them."""
+    t, v = times - times.mean(), values - values.mean()
+    spread = float(t @ t)
+    return float(np.abs(v - (float(t @ v) / spread if spread > 0.0 else 0.0) * t).max())
 
 
 class HostSleep:

@@ -77,6 +77,11 @@ class Laumas:
         else:
             raise Refusal(ILLEGAL_ADDRESS)
 
+    def power_up(self, at_s: float) -> None:
+        """The device starts anew: without tare and zero."""
+        self.amplifier.reset_tare()
+        self.amplifier.reset_zero()
+
     def read_bits(self, address: int, count: int, at_s: float) -> list[bool]:
         """There are no bits."""
         raise Refusal(ILLEGAL_ADDRESS)

@@ -35,6 +35,8 @@ class MtSics:
         self.unit = unit
         self.updates_Hz = UPDATES_HZ
         self.lines_sent = 0
+        self.refuse: Callable[[float], int | None] | None = None
+        """A fault: commands at a time are answered with `I` where this gives a number."""
         self._buffer = bytearray()
         self._pending: Event | None = None
         self._stream: Event | None = None
@@ -80,6 +82,9 @@ class MtSics:
             self._reply("ET", at_s)
             return
         name, _, argument = line.decode("ascii").partition(" ")
+        if self.refuse is not None and self.refuse(at_s) is not None:
+            self._reply(f"{'S' if name in ('SI', 'SIR') else name} I", at_s)
+            return
         if name in ("S", "SI", "SIR", "@"):
             self._end_stream()
         self._cancel_pending()
@@ -128,11 +133,12 @@ class MtSics:
         return f"{counts * 10.0**-places:10.{places}f} {self.unit}"
 
     def _value(self, at_s: float, status: str = "") -> str:
-        beyond = self._beyond(at_s)
+        gross = self.amplifier.gross(at_s)  # one conversion: what is beyond the range is what would be shown
+        beyond = self.amplifier.over_range(gross)
         if beyond:
-            return f"S {beyond}"
-        counts = self.amplifier.gross(at_s) - self.amplifier.tare
-        return f"S {status or ('S' if self.amplifier.still(at_s) else 'D')} {self._number(counts)}"
+            return f"S {'+' if beyond > 0 else '-'}"
+        still = "S" if self.amplifier.still(at_s) else "D"
+        return f"S {status or still} {self._number(gross - self.amplifier.tare)}"
 
     def _stable_value(self, at_s: float, name: str, status: str) -> str:
         return self._value(at_s, status)
@@ -204,6 +210,15 @@ class MtSics:
             self.updates_Hz = rate_Hz
             return "UPD A"
         return f"UPD A {self.updates_Hz:.1f}"
+
+    def power_up(self, at_s: float) -> None:
+        """The device starts anew: silent, without tare and zero."""
+        self._end_stream()
+        self._cancel_pending()
+        self._buffer.clear()
+        self.updates_Hz = UPDATES_HZ
+        self.amplifier.reset_tare()
+        self.amplifier.reset_zero()
 
     def _reset(self, argument: str, at_s: float) -> str:
         self.amplifier.reset_tare()

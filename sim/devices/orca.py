@@ -82,7 +82,14 @@ class Orca:
             self._enter(mode, at_s)
         elif mode in _WATCHED:
             self._commanded(at_s)
-        return _COMMAND_REPLY.pack(COMMAND, *self._stream_values(at_s))
+        return self.stream_reply(COMMAND, at_s)
+
+    def stream_reply(self, code: int, at_s: float) -> bytes:
+        """The answer's PDU to a command (0x64) or a write (0x69) of the stream."""
+        values = self._stream_values(at_s)
+        return (
+            _COMMAND_REPLY.pack(COMMAND, *values) if code == COMMAND else _WRITE_REPLY.pack(WRITE, self.mode, *values)
+        )
 
     def _read_stream(self, pdu: bytes, at_s: float) -> bytes:
         address, width = _READ_REQUEST.unpack(pdu)
@@ -97,8 +104,7 @@ class Orca:
         if width not in (1, 2):
             raise Refusal(ILLEGAL_VALUE)
         self.write_registers(address, [value & 0xFFFF, value >> 16][:width], at_s)
-        values = self._stream_values(at_s)
-        return _WRITE_REPLY.pack(WRITE, self.mode, *values)
+        return self.stream_reply(WRITE, at_s)
 
     def _stream_values(self, at_s: float) -> tuple[int, int, int, int, int, int]:
         """Position µm, force mN, power W, temperature °C, voltage mV, errors."""

@@ -141,6 +141,24 @@ class SmcLec(RegisterAxis):
             if self._can_move(origin=True):
                 self._start(at_s)
 
+    def fail(self, code: int, at_s: float) -> None:
+        """An alarm from outside (overload, heat): the servo goes off; 0 takes it back. The code is not told."""
+        self.drive.plant.advance(at_s)
+        self.alarm = bool(code)
+        if code:
+            self.mover.switch(False)
+            self._ready = False
+
+    def power_up(self, at_s: float) -> None:
+        """The controller starts anew: servo off, no origin, in parallel input mode, counting from where it is."""
+        self.drive.plant.advance(at_s)
+        self.mover.switch(False)
+        self.mover.homed = self.mover.paused = False
+        self.alarm = self._ready = False
+        self.coils = dict.fromkeys(COILS, False)
+        self.values = dict.fromkeys(self.values, 0)
+        self.drive.zero_mm = self.drive.plant.position_mm
+
     # -- moves ---------------------------------------------------------------------------------------------------
 
     def _raise(self) -> None:

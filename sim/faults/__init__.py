@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sim.faults import answers, bytes_, force, frames, host, mover, port
+from sim.faults import answers, bytes_, disturbance, force, frames, host, mover, port, requests
 from sim.faults.base import (
     COMMON,
     RECOVERED,
@@ -31,8 +31,10 @@ FAMILIES = {
     "Bytes on the wire": bytes_.KINDS,
     "Frames": frames.KINDS,
     "Answers and settings of a device": answers.KINDS,
+    "What a device makes of a request": requests.KINDS,
     "The port": port.KINDS,
     "What the load cell says": force.KINDS,
+    "What gets into the load cell's signal": disturbance.KINDS,
     "The motor and its position": mover.KINDS,
     "The host": host.KINDS,
 }

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from sim.faults.base import RECOVERED, REFUSED, STOPPED, Device, Fault, FaultError, Kind, Parameter, Reaction
 from sim.faults.bytes_ import IN_HOLD, IN_RAMP
-from sim.faults.site import Site
+from sim.faults.site import Site, Spell
 from sim.line import Line, Pieces
 
 BOTH: tuple[Device, ...] = ("motor", "load_cell")
@@ -18,25 +18,14 @@ def _exception(fault: Fault, site: Site) -> None:
     if not hasattr(target, "refuse"):
         raise FaultError(fault.index, "kind", "`exception` is not simulated for this device")
     code = int(fault.number("code"))
-    pending = False
-    until_s = -1.0
-
-    def begin(at_s: float) -> None:
-        nonlocal pending, until_s
-        if fault.duration_s is None:
-            pending = True
-        else:
-            until_s = at_s + fault.duration_s
+    spell = Spell(fault.duration_s)
+    before: Callable[[float], int | None] | None = target.refuse
 
     def refuse(at_s: float) -> int | None:
-        nonlocal pending
-        if not pending and at_s >= until_s:
-            return None
-        pending = False
-        return code
+        return code if spell.takes(at_s) else before(at_s) if before is not None else None
 
     target.refuse = refuse
-    site.when(fault, begin)
+    site.when(fault, spell.begin)
 
 
 def _restart(fault: Fault, site: Site) -> None:
@@ -131,6 +120,14 @@ KINDS: tuple[Kind, ...] = (
             Reaction("load_cell", {"at_s": 0, "duration_s": 60}, REFUSED, "load_cell.*refuses"),
             Reaction("load_cell", {**IN_HOLD, "duration_s": 60}, STOPPED, "load.cell", bench="simulated_modbus"),
             Reaction("motor", {**IN_HOLD, "duration_s": 60}, STOPPED, "motor.*exception", bench="simulated_iai"),
+            Reaction(
+                "load_cell", {"at_s": 0, "duration_s": 60}, REFUSED, "load_cell.*refuses", bench="simulated_balance"
+            ),
+            Reaction(
+                "load_cell", {"at_s": 0, "duration_s": 60}, REFUSED, "load_cell.*refuses", bench="simulated_laumas"
+            ),
+            Reaction("load_cell", {**IN_HOLD, "duration_s": 60}, STOPPED, "load.cell", bench="simulated_laumas"),
+            Reaction("motor", {**IN_HOLD, "duration_s": 60}, STOPPED, "motor.*exception", bench="simulated_smc_lec"),
         ),
         (Parameter("code", "", 4, "the exception's number", 1, 11),),
         frames=True,
@@ -158,6 +155,17 @@ KINDS: tuple[Kind, ...] = (
             Reaction("load_cell", {"at_s": 0, "comes_back": "baudrate"}, REFUSED, "load_cell: no answer"),
             Reaction("load_cell", {"step": "approach", "comes_back": "decimals"}, STOPPED, "load cell is silent"),
             Reaction("motor", {**IN_HOLD}, STOPPED, "motor", bench="simulated_iai"),
+            Reaction("load_cell", {**IN_HOLD}, STOPPED, "load cell is silent", bench="simulated_balance"),
+            Reaction("load_cell", {**IN_HOLD}, STOPPED, "load cell is silent", bench="simulated_laumas"),
+            Reaction(
+                "load_cell",
+                {**IN_RAMP, "off_s": 0.03},
+                RECOVERED,
+                shows="load_cell",
+                why="it is asked again",
+                bench="simulated_laumas",
+            ),
+            Reaction("motor", {**IN_HOLD}, STOPPED, "motor", bench="simulated_smc_lec"),
         ),
         (
             Parameter("off_s", "s", 0.5, "how long it is off", 0.0, 60.0),
@@ -191,6 +199,37 @@ KINDS: tuple[Kind, ...] = (
                 STOPPED,
                 "no contact",
                 why="it moves away from the pad, and says that it goes towards it",
+            ),
+            Reaction(
+                "load_cell",
+                {**IN_HOLD, "setting": "baudrate"},
+                STOPPED,
+                "load cell is silent",
+                bench="simulated_balance",
+            ),
+            Reaction(
+                "load_cell",
+                {**IN_HOLD, "setting": "decimals"},
+                RECOVERED,
+                why="it sends the decimal point",
+                bench="simulated_balance",
+            ),
+            Reaction(
+                "load_cell", {**IN_HOLD, "setting": "address"}, STOPPED, "load cell is silent", bench="simulated_laumas"
+            ),
+            Reaction(
+                "load_cell",
+                {**IN_HOLD, "setting": "decimals"},
+                RECOVERED,
+                why="its registers always have three",
+                bench="simulated_laumas",
+            ),
+            Reaction(
+                "motor",
+                {**IN_HOLD, "setting": "address"},
+                STOPPED,
+                "motor.*(silent|no answer)",
+                bench="simulated_smc_lec",
             ),
         ),
         (Parameter("setting", "", "baudrate", "which", words=SETTINGS),),

@@ -17,7 +17,7 @@ Distortion = Callable[[float, float], float]
 """(true reading in N, time) → what the device takes for it."""
 
 
-def _reading(fault: Fault, site: Site, made: Callable[[float], Distortion]) -> None:
+def distort(fault: Fault, site: Site, made: Callable[[float], Distortion]) -> None:
     """While the fault lasts, readings go through what `made(its beginning)` gives."""
     amplifier = site.part(fault, "amplifier")
     active: list[Distortion] = []
@@ -41,22 +41,22 @@ def _frozen(fault: Fault, site: Site) -> None:
 
         return frozen
 
-    _reading(fault, site, made)
+    distort(fault, site, made)
 
 
 def _saturated(fault: Fault, site: Site) -> None:
     limit_N = fault.number("limit_N")
-    _reading(fault, site, lambda began_s: lambda force_N, at_s: max(-limit_N, min(limit_N, force_N)))
+    distort(fault, site, lambda began_s: lambda force_N, at_s: max(-limit_N, min(limit_N, force_N)))
 
 
 def _overload(fault: Fault, site: Site) -> None:
     sign = 1.0 if fault.word("direction") == "over" else -1.0
-    _reading(fault, site, lambda began_s: lambda force_N, at_s: sign * 1e9)
+    distort(fault, site, lambda began_s: lambda force_N, at_s: sign * 1e9)
 
 
 def _jump(fault: Fault, site: Site) -> None:
     by_N = fault.number("by_N")
-    _reading(fault, site, lambda began_s: lambda force_N, at_s: force_N + by_N)
+    distort(fault, site, lambda began_s: lambda force_N, at_s: force_N + by_N)
 
 
 def _spike(fault: Fault, site: Site) -> None:
@@ -81,12 +81,12 @@ def _spike(fault: Fault, site: Site) -> None:
 
 def _drift(fault: Fault, site: Site) -> None:
     rate_N_s = fault.number("rate_N_s")
-    _reading(fault, site, lambda began_s: lambda force_N, at_s: force_N + rate_N_s * (at_s - began_s))
+    distort(fault, site, lambda began_s: lambda force_N, at_s: force_N + rate_N_s * (at_s - began_s))
 
 
 def _gain(fault: Fault, site: Site) -> None:
     factor = fault.number("factor")
-    _reading(fault, site, lambda began_s: lambda force_N, at_s: factor * force_N)
+    distort(fault, site, lambda began_s: lambda force_N, at_s: factor * force_N)
 
 
 def _zero(fault: Fault, site: Site) -> None:
@@ -102,7 +102,7 @@ def _zero(fault: Fault, site: Site) -> None:
 
 def _noisy(fault: Fault, site: Site) -> None:
     random, std_N = site.random(fault), fault.number("std_N")
-    _reading(fault, site, lambda began_s: lambda force_N, at_s: force_N + float(random.normal(0.0, std_N)))
+    distort(fault, site, lambda began_s: lambda force_N, at_s: force_N + float(random.normal(0.0, std_N)))
 
 
 KINDS: tuple[Kind, ...] = (
@@ -117,6 +117,8 @@ KINDS: tuple[Kind, ...] = (
             Reaction(
                 "load_cell", {"step": "approach", "after_s": 0.05}, STOPPED, "(?i)froz|same|stand|still|no contact"
             ),
+            Reaction("load_cell", {**IN_HOLD}, STOPPED, "frozen", bench="simulated_balance"),
+            Reaction("load_cell", {**IN_HOLD}, STOPPED, "frozen", bench="simulated_laumas"),
         ),
     ),
     Kind(
@@ -149,6 +151,8 @@ KINDS: tuple[Kind, ...] = (
                 "load_cell", {"at_s": 0.0}, STOPPED, "overload", why="it answers, and says that it cannot measure"
             ),
             Reaction("load_cell", {**IN_HOLD}, STOPPED, "overload|force", bench="simulated_modbus"),
+            Reaction("load_cell", {**IN_RAMP}, STOPPED, "overload", bench="simulated_balance"),
+            Reaction("load_cell", {**IN_HOLD}, STOPPED, "overload", bench="simulated_laumas"),
         ),
         (Parameter("direction", "", "over", "beyond which end", words=("over", "under")),),
     ),
@@ -177,6 +181,7 @@ KINDS: tuple[Kind, ...] = (
             Reaction(
                 "load_cell", {"at_s": 1.0, "by_N": 0.5}, STOPPED, "(?i)steady|touches|jump", why="while it is tared"
             ),
+            Reaction("load_cell", {**IN_HOLD, "by_N": -2.0}, STOPPED, "(?i)jump", bench="simulated_laumas"),
         ),
         (Parameter("by_N", "N", 1.0, "by how much", -1e6, 1e6),),
     ),
@@ -188,6 +193,7 @@ KINDS: tuple[Kind, ...] = (
         (
             Reaction("load_cell", {"rate_per_s": 3.0, "by_N": 0.3}, RECOVERED, why="two in a row count as a touch"),
             Reaction("load_cell", {**IN_HOLD, "by_N": 30.0}, STOPPED, "force limit"),
+            Reaction("load_cell", {**IN_HOLD, "by_N": 30.0}, STOPPED, "force limit", bench="simulated_balance"),
         ),
         (Parameter("by_N", "N", 1.0, "by how much", -1e6, 1e6),),
         lasting=False,
@@ -250,6 +256,8 @@ KINDS: tuple[Kind, ...] = (
         (
             Reaction("load_cell", {**IN_HOLD}, STOPPED, "(?i)jump|tare|zero|load cell|motor"),
             Reaction("load_cell", {"at_s": 0.1}, RECOVERED, why="before the tare it is as good as any zero"),
+            Reaction("load_cell", {**IN_HOLD}, STOPPED, "(?i)jump", bench="simulated_balance"),
+            Reaction("load_cell", {**IN_HOLD}, STOPPED, "(?i)jump", bench="simulated_laumas"),
         ),
         lasting=False,
     ),

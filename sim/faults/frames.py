@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.faults.base import RECOVERED, REFUSED, STOPPED, Device, Fault, Kind, Parameter, Reaction
+from sim.faults.base import RECOVERED, REFUSED, STOPPED, Device, Fault, FaultError, Kind, Parameter, Reaction
 from sim.faults.bytes_ import DIRECTION, IN_HOLD, IN_RAMP, LONG, outwards
 from sim.faults.site import Site
 from sim.line import Pieces
@@ -63,6 +63,9 @@ def _address(fault: Fault, site: Site) -> None:
 
 
 def _checksum(fault: Fault, site: Site) -> None:
+    if type(site.device(fault)).__name__ == "MtSics":
+        raise FaultError(fault.index, "kind", "lines of MT-SICS have no checksum", "take `bytes_corrupted`")
+
     def change(data: bytes) -> Pieces:
         body = data.rstrip(b"\r\n")
         if body == data:
@@ -75,6 +78,30 @@ def _checksum(fault: Fault, site: Site) -> None:
 
 def _silent(fault: Fault, site: Site) -> None:
     site.frames(fault, lambda data: (), outwards(fault))
+
+
+def _stale(fault: Fault, site: Site) -> None:
+    """What is kept from the first answer on comes as the second, and so on."""
+    kept = b""
+    on = False
+
+    def begin(at_s: float) -> None:
+        nonlocal kept, on
+        kept, on = b"", True
+
+    def end(at_s: float) -> None:
+        nonlocal on
+        on = False
+
+    def tamper(data: bytes, at_s: float) -> Pieces:
+        nonlocal kept
+        if not on:
+            return ((data, 0.0),)
+        before, kept = kept, data
+        return ((before, 0.0),)
+
+    site.line(fault).tamper(tamper, False)
+    site.when(fault, begin, end)
 
 
 KINDS: tuple[Kind, ...] = (
@@ -116,6 +143,7 @@ KINDS: tuple[Kind, ...] = (
             Reaction("motor", {"at_s": 0, "duration_s": 60}, REFUSED, "motor"),
             Reaction("load_cell", {"at_s": 0, "duration_s": 60}, REFUSED, "load_cell", bench="simulated_modbus"),
             Reaction("load_cell", {**IN_RAMP, **LONG}, STOPPED, "load cell is silent", bench="simulated_modbus"),
+            Reaction("load_cell", {**IN_RAMP, **LONG}, STOPPED, "load cell is silent", bench="simulated_laumas"),
         ),
         frames=True,
     ),
@@ -131,6 +159,8 @@ KINDS: tuple[Kind, ...] = (
             Reaction("load_cell", {**IN_HOLD, **LONG}, STOPPED, "load cell is silent"),
             Reaction("motor", {"at_s": 0, "duration_s": 60}, REFUSED, "motor.*(checksum|CRC)"),
             Reaction("motor", {**IN_HOLD, **LONG}, STOPPED, "motor", bench="simulated_iai"),
+            Reaction("load_cell", {**IN_HOLD, **LONG}, STOPPED, "load cell is silent", bench="simulated_laumas"),
+            Reaction("motor", {**IN_HOLD, **LONG}, STOPPED, "motor", bench="simulated_smc_lec"),
         ),
         (DIRECTION,),
         frames=True,
@@ -155,8 +185,58 @@ KINDS: tuple[Kind, ...] = (
             Reaction("load_cell", {"at_s": 0, "duration_s": 60}, REFUSED, "load_cell.*no answer"),
             Reaction("motor", {**IN_HOLD, "duration_s": 60}, STOPPED, "motor is silent", bench="simulated_iai"),
             Reaction("load_cell", {**IN_RAMP, "duration_s": 60}, STOPPED, "load cell is silent", bench="simulated_iai"),
+            Reaction(
+                "load_cell", {**IN_RAMP, "duration_s": 60}, STOPPED, "load cell is silent", bench="simulated_balance"
+            ),
+            Reaction(
+                "load_cell", {**IN_RAMP, "duration_s": 60}, STOPPED, "load cell is silent", bench="simulated_laumas"
+            ),
+            Reaction(
+                "load_cell", {"at_s": 0, "duration_s": 60}, REFUSED, "load_cell.*no answer", bench="simulated_laumas"
+            ),
+            Reaction("motor", {**IN_HOLD, "duration_s": 60}, STOPPED, "motor is silent", bench="simulated_smc_lec"),
         ),
         (DIRECTION,),
         frames=True,
+    ),
+    Kind(
+        "stale_answers",
+        "Each answer is that to the request before: one was late, and a gateway hands them on in turn.",
+        BOTH,
+        _stale,
+        (
+            Reaction(
+                "motor", {"at_s": 0}, STOPPED, "motor", why="what it answers makes no sense: it is never energised"
+            ),
+            Reaction(
+                "motor",
+                {**IN_HOLD, "duration_s": 0.2},
+                RECOVERED,
+                shows="motor",
+                why="a stream's answers are alike: each one period old",
+            ),
+            Reaction("load_cell", {"at_s": 0}, RECOVERED, shows="load_cell", why="what is asked again is answered"),
+            Reaction("load_cell", {**IN_HOLD}, RECOVERED, why="a line is one interval old"),
+            Reaction("load_cell", {"at_s": 0}, REFUSED, "load_cell.*no answer", bench="simulated_modbus"),
+            Reaction("load_cell", {**IN_HOLD}, STOPPED, "load cell is silent", bench="simulated_modbus"),
+            Reaction("motor", {**IN_RAMP}, RECOVERED, shows="motor", bench="simulated_iai", why="each is one poll old"),
+            Reaction("load_cell", {**IN_HOLD}, RECOVERED, why="a line is one interval old", bench="simulated_balance"),
+            Reaction(
+                "load_cell",
+                {**IN_HOLD},
+                RECOVERED,
+                shows="load_cell",
+                why="nothing in RTU tells: each is one poll old",
+                bench="simulated_laumas",
+            ),
+            Reaction(
+                "motor",
+                {**IN_RAMP},
+                STOPPED,
+                "motor",
+                why="a command is not seen to be taken",
+                bench="simulated_smc_lec",
+            ),
+        ),
     ),
 )

@@ -11,20 +11,20 @@ from sim.faults.site import Site
 IN_HOMING = {"at_s": 1.0}
 """The controllers that home begin with it at once, and are on their way then."""
 
-STUCK = "home return does not end: its position has stood still"
+STUCK = "(home return|return to origin) does not end(: its position has stood still| within 120 s)"
 
 
 def _stall(fault: Fault, site: Site) -> None:
     plant = site.plant
 
-    def set_to(force_N: float) -> Callable[[float], None]:
+    def set_to(force_N: float | None) -> Callable[[float], None]:
         def act(at_s: float) -> None:
             plant.advance(at_s)
-            plant.weaken(force_N)
+            plant.weaken(set_to, force_N)
 
         return act
 
-    site.when(fault, set_to(0.0), set_to(plant.settings.max_force_N))
+    site.when(fault, set_to(0.0), set_to(None))
 
 
 def _derated(fault: Fault, site: Site) -> None:
@@ -40,7 +40,7 @@ def _derated(fault: Fault, site: Site) -> None:
                 return
             share = min(1.0, (now_s - at_s) / within_s) if within_s > 0.0 else 1.0
             plant.advance(now_s)
-            plant.weaken(full_N + (left_N - full_N) * share)
+            plant.weaken(begin, full_N + (left_N - full_N) * share)
             if share < 1.0:
                 site.clock.schedule(now_s + max(1e-3, within_s / 50.0), less)
 
@@ -52,7 +52,7 @@ def _derated(fault: Fault, site: Site) -> None:
         nonlocal over
         over = True
         plant.advance(at_s)
-        plant.weaken(full_N)
+        plant.weaken(begin, None)
 
     site.when(fault, begin, end)
 
@@ -149,6 +149,34 @@ def _spike(fault: Fault, site: Site) -> None:
     site.when(fault, begin)
 
 
+SLIP_S = 0.002
+"""In steps of so long a slip is made."""
+
+
+def _slipping(fault: Fault, site: Site) -> None:
+    """What the motor counts from moves, so that its positions are of another place from step to step."""
+    drive, rate_mm_s = site.part(fault, "drive"), fault.number("rate_mm_s")
+    on = False
+
+    def begin(at_s: float) -> None:
+        nonlocal on
+        if not on:
+            on = True
+            site.clock.schedule(at_s + SLIP_S, more)
+
+    def more(at_s: float) -> None:
+        if on and not site.over:
+            site.plant.advance(at_s)
+            drive.zero_mm += SLIP_S * rate_mm_s
+            site.clock.schedule(at_s + SLIP_S, more)
+
+    def end(at_s: float) -> None:
+        nonlocal on
+        on = False
+
+    site.when(fault, begin, end)
+
+
 KINDS: tuple[Kind, ...] = (
     Kind(
         "stall",
@@ -161,6 +189,8 @@ KINDS: tuple[Kind, ...] = (
             Reaction("motor", {"step": "approach", "after_s": 0.05}, STOPPED, "following error"),
             Reaction("motor", {**IN_RAMP}, STOPPED, "following error", bench="simulated_iai"),
             Reaction("motor", {**IN_HOMING}, STOPPED, STUCK, bench="simulated_iai", why="while it homes"),
+            Reaction("motor", {**IN_RAMP}, STOPPED, "following error|did not get", bench="simulated_smc_lec"),
+            Reaction("motor", {**IN_HOMING}, STOPPED, STUCK, why="while it homes", bench="simulated_smc_lec"),
         ),
     ),
     Kind(
@@ -169,10 +199,13 @@ KINDS: tuple[Kind, ...] = (
         ("motor",),
         _derated,
         (
-            Reaction("motor", {**IN_RAMP, "left_N": 0.5}, STOPPED, "following error|fault"),
+            Reaction("motor", {**IN_RAMP, "left_N": 0.5}, STOPPED, "following error|fault|did not get where"),
             Reaction("motor", {"at_s": 0, "left_N": 60.0}, RECOVERED, why="it is still strong enough"),
             Reaction(
                 "motor", {**IN_HOMING, "left_N": 0.1}, STOPPED, STUCK, bench="simulated_iai", why="while it homes"
+            ),
+            Reaction(
+                "motor", {**IN_HOMING, "left_N": 0.1}, STOPPED, STUCK, why="while it homes", bench="simulated_smc_lec"
             ),
         ),
         (
@@ -196,6 +229,15 @@ KINDS: tuple[Kind, ...] = (
             Reaction("motor", {**IN_RAMP}, STOPPED, "following error", bench="simulated_iai"),
             Reaction("motor", {**IN_HOMING}, STOPPED, STUCK, bench="simulated_iai", why="while it homes"),
             Reaction("motor", {**IN_HOLD, "duration_s": 0.1}, RECOVERED, why="it was to stand there anyway"),
+            Reaction(
+                "motor",
+                {**IN_RAMP},
+                STOPPED,
+                "following error|did not get where it was sent",
+                why="its following error alone allows for it",
+                bench="simulated_smc_lec",
+            ),
+            Reaction("motor", {**IN_HOMING}, STOPPED, STUCK, why="while it homes", bench="simulated_smc_lec"),
         ),
     ),
     Kind(
@@ -217,7 +259,12 @@ KINDS: tuple[Kind, ...] = (
         (
             Reaction("motor", {**IN_HOLD, "by_mm": 1.0}, STOPPED, "following error|speed limit|force limit"),
             Reaction("motor", {**IN_RAMP, "by_mm": -1.0}, STOPPED, "following error|speed limit"),
-            Reaction("motor", {"step": "approach", "by_mm": 3.0}, STOPPED, "following error|speed limit|force limit"),
+            Reaction(
+                "motor",
+                {"step": "approach", "by_mm": 3.0},
+                STOPPED,
+                "following error|speed limit|force limit|as the motor was energised",
+            ),
         ),
         (Parameter("by_mm", "mm", 1.0, "by how much", -100.0, 100.0),),
         lasting=False,
@@ -242,6 +289,15 @@ KINDS: tuple[Kind, ...] = (
             ),
             Reaction("motor", {**IN_HOLD, "code": 1024, "duration_s": 0.02}, STOPPED, "motor reports a fault.*volt"),
             Reaction("motor", {"at_s": 0, "code": 64}, RECOVERED, why="what sleep mode clears was of before the run"),
+            Reaction("motor", {**IN_RAMP}, STOPPED, "motor reports a fault: alarm", bench="simulated_smc_lec"),
+            Reaction(
+                "motor",
+                {**IN_HOMING},
+                STOPPED,
+                "return to origin.*alarm",
+                why="while it homes: its alarm ends the waiting",
+                bench="simulated_smc_lec",
+            ),
         ),
         (Parameter("code", "", 64, "error bits (Orca) or alarm code (IAI)", 1, 0xFFFF),),
     ),
@@ -254,8 +310,14 @@ KINDS: tuple[Kind, ...] = (
             Reaction("motor", {**IN_RAMP}, STOPPED, "following error"),
             Reaction("motor", {**IN_HOLD}, STOPPED, "(?i)following error|froz|same|still"),
             Reaction("motor", {"step": "approach", "after_s": 0.05}, STOPPED, "(?i)following error|froz|same|still"),
-            Reaction("motor", {"step": "approach", "after_s": 0.6}, STOPPED, "position stands still"),
+            Reaction(
+                "motor",
+                {"step": "approach", "after_s": 0.6},
+                STOPPED,
+                "position stands still|contact after only 0.000 mm",
+            ),
             Reaction("motor", {**IN_RAMP}, STOPPED, "(?i)following error|froz", bench="simulated_iai"),
+            Reaction("motor", {**IN_RAMP}, STOPPED, "(?i)following error|froz|did not get", bench="simulated_smc_lec"),
         ),
     ),
     Kind(
@@ -287,5 +349,24 @@ KINDS: tuple[Kind, ...] = (
         ),
         (Parameter("by_mm", "mm", 0.02, "by how much", -1e3, 1e3),),
         lasting=False,
+    ),
+    Kind(
+        "position_drift",
+        "The axis creeps away from where the motor says it is: a coupling slips, a scale grows warm.",
+        ("motor",),
+        _slipping,
+        (
+            Reaction("motor", {"at_s": 0, "rate_mm_s": 0.002}, RECOVERED, why="some micrometres in a run"),
+            Reaction("motor", {**IN_HOLD, "rate_mm_s": 5.0}, STOPPED, "force limit|as the motor was energised"),
+            Reaction("motor", {**IN_HOLD, "rate_mm_s": 5.0}, STOPPED, "following error", bench="simulated_iai"),
+            Reaction(
+                "motor",
+                {**IN_HOLD, "rate_mm_s": 5.0},
+                STOPPED,
+                "force limit|following|did not get",
+                bench="simulated_smc_lec",
+            ),
+        ),
+        (Parameter("rate_mm_s", "mm/s", 0.01, "how fast, positive into the pad", -100.0, 100.0),),
     ),
 )

@@ -26,6 +26,29 @@ class Strike:
     device: str
 
 
+class Spell:
+    """Which frames or requests a fault takes once it has begun: the next one, or all of them for `duration_s`."""
+
+    def __init__(self, duration_s: float | None) -> None:
+        self._duration_s = duration_s
+        self._pending = False
+        self._until_s = -1.0
+
+    def begin(self, at_s: float) -> None:
+        """The fault strikes."""
+        if self._duration_s is None:
+            self._pending = True
+        else:
+            self._until_s = at_s + self._duration_s
+
+    def takes(self, at_s: float) -> bool:
+        """Whether what comes by now is struck; without a duration, the one that asks is the one."""
+        if not self._pending and at_s >= self._until_s:
+            return False
+        self._pending = False
+        return True
+
+
 class Site:
     """The bench's parts that faults change, a stream of random numbers for each fault, and what has struck so far."""
 
@@ -114,22 +137,10 @@ class Site:
 
         Without a duration that is the next frame, else all of them for so long.
         """
-        pending = False
-        until_s = -1.0
-
-        def begin(at_s: float) -> None:
-            nonlocal pending, until_s
-            if fault.duration_s is None:
-                pending = True
-            else:
-                until_s = at_s + fault.duration_s
+        spell = Spell(fault.duration_s)
 
         def tamper(data: bytes, at_s: float) -> Pieces:
-            nonlocal pending
-            if not pending and at_s >= until_s:
-                return ((data, 0.0),)
-            pending = False
-            return change(data)
+            return change(data) if spell.takes(at_s) else ((data, 0.0),)
 
         self.line(fault).tamper(tamper, to_device)
-        self.when(fault, begin)
+        self.when(fault, spell.begin)

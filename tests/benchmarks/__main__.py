@@ -14,7 +14,10 @@ from pathlib import Path
 
 from tests.benchmarks.report import Section, Table, goal_table, machine
 
-NAMES = ("dry_run", "plant", "wire", "stop_latency", "fit", "estimator", "touch_off", "recording", "export")
+NAMES = (
+    "dry_run", "plant", "wire", "stop_latency", "fit", "estimator", "undetermined", "touch_off", "recording", "day",
+    "export",
+)  # fmt: skip
 """In the order of the page; each is a module of this package with `run() -> Section`."""
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "benchmarks.md"

@@ -236,6 +236,16 @@ def test_a_tcp_reply_to_an_earlier_request_is_skipped() -> None:
     assert read_tcp(stale + TCP_GOOD) == [0x022B, 0, 0x64]
 
 
+def test_a_sample_over_tcp_that_comes_late_is_nobodys() -> None:
+    """A second try would bear the same number: the late reply would pass for a value of that later time."""
+    link = scripted_link([(TCP_READ, [(0.2, TCP_GOOD)])], attempts=3)
+    modbus = ModbusClient(link, 0x11, transport="tcp", turnaround_s=0.05)
+    sample = modbus.sample_registers("holding", 0x6B, 3, lambda words, time_s, _received_s: (words, time_s))
+    with pytest.raises(DeviceTimeout):
+        call(sample, link)
+    assert link.traffic.retries == 0
+
+
 @pytest.mark.parametrize(
     ("frame", "error", "message"),
     [

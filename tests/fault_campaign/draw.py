@@ -12,8 +12,12 @@ import numpy as np
 from bench.protocol import Protocol
 from sim.faults import KINDS, Reaction
 from sim.faults.base import WHEN
+from tests.faults.faulty import APPROACH_mm_s
 
-BENCHES = ("simulated", "simulated", "simulated", "simulated_iai", "simulated_modbus")
+BENCHES = (
+    *["simulated"] * 4, "simulated_iai", "simulated_iai", "simulated_modbus",
+    "simulated_smc_lec", "simulated_balance", "simulated_laumas",
+)  # fmt: skip
 DEEPEST_mm = 1.4
 VARIED = ("off_s", "for_s", "gap_s", "duration_s", "ahead_mm", "within_s")
 """Numbers of a fault that a seed takes larger or smaller than the table's row."""
@@ -60,7 +64,13 @@ def draw(seed: int) -> Drawn:
         own = {key: value for key, value in reaction.fault.items() if key not in (*WHEN, "after_s")}
         own = {key: _varied(random, value) if key in VARIED else value for key, value in own.items()}
         faults.append({"kind": kind, "device": reaction.device, **own, **_when(random, kind, reaction)})
-    return Drawn(seed, base, tuple(faults), _protocol(random), round(float(random.uniform(0.4, 0.9)), 3))
+    return Drawn(
+        seed,
+        base,
+        tuple(faults),
+        _protocol(random, APPROACH_mm_s.get(base.removeprefix("simulated_"), 4.0)),
+        round(float(random.uniform(0.4, 0.9)), 3),
+    )
 
 
 def _varied(random: np.random.Generator, value: float) -> float:
@@ -81,7 +91,7 @@ def _when(random: np.random.Generator, kind: str, reaction: Reaction) -> dict[st
     return {"at_s": round(float(random.uniform(0.0, ABOUT_s)), 4)}
 
 
-def _protocol(random: np.random.Generator) -> Protocol:
+def _protocol(random: np.random.Generator, approach_mm_s: float) -> Protocol:
     steps: list[dict[str, Any]] = []
     for _ in range(int(random.integers(1, 4))):
         hold = round(float(random.uniform(0.0, 0.3)), 3)
@@ -93,7 +103,7 @@ def _protocol(random: np.random.Generator) -> Protocol:
             steps.append({"to": depth, "speed": round(float(random.uniform(5.0, 60.0)), 1), "hold": hold})
     content = {
         "name": "drawn",
-        "approach": {"speed": 4, "force": 0.05, "retract": 0.3},
+        "approach": {"speed": approach_mm_s, "force": 0.05, "retract": 0.3},
         "limits": {"force": 8, "depth": 1.6},
         "steps": steps,
         "finish": {"retract": 0.3, "air": 0.05},

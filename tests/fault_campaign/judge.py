@@ -19,8 +19,24 @@ from tests.faults.test_kinds import LOST_AT_MOST_s
 SHIFTS = ("lost_position", "foreign_commands", "position_jump")
 """Faults after which the axis is not where it says: `by_mm` is how far they take it by themselves."""
 
-BLIND = ("force_gain", "force_saturated", "force_frozen", "force_jump", "force_drift", "setting_changes", "zero_key")
+BLIND = (
+    "force_gain", "force_saturated", "force_frozen", "force_jump", "force_drift", "setting_changes", "zero_key",
+    "gain_drift", "cable_open", "other_map",
+)  # fmt: skip
 """Faults after which the cell says less than there is: travel and depth still hold, the force limit is deceived."""
+
+
+ALSO = {
+    "derating": "stands still|its zero has moved since|travel limit",
+    "force_drift": "was not reached|contact after only",
+    "force_frozen": "the motor pushes with",
+    "foreign_commands": "already touches something",
+    "frames_glued": "the motor reports a fault: force limit",
+    "lost_position": "contact after only",
+    "position_jump": "the motor reports a fault before any motion: force limit",
+    "stall": "stands still",
+}
+"""What a fault is known to lead to at other instants, or with other protocols, than those of the table's rows."""
 
 
 @dataclass
@@ -66,20 +82,32 @@ def tried(seed: int) -> Verdict:
 def again(verdict: Verdict) -> list[str]:
     """What differs when the same seed is run once more."""
     second = judge(verdict.seed)
-    if (second.how, second.cause) != (verdict.how, verdict.cause):
+    if (second.how, _placeless(second.cause)) != (verdict.how, _placeless(verdict.cause)):
         return [f"the same seed ended otherwise: {second.how}, {second.cause}"]
     return [] if second.content == verdict.content else ["the same seed wrote other bytes"]
+
+
+def _placeless(cause: str) -> str:
+    """Without the folder, which is another one each time."""
+    return re.sub(r"\S*padbench-[^/\\]*", "", cause)
 
 
 def safe(seen: Seen, drawn: Drawn) -> list[str]:
     """Force and travel within limits and the way to stop, and the motor at rest: of the true bench."""
     struck = {strike.kind for strike in seen.struck}
     shift_mm = sum(_shift_mm(fault) for fault in drawn.faults if fault["kind"] in struck)
+    shift_mm += sum(_crept_mm(fault, seen) for fault in drawn.faults if fault["kind"] in struck)
     return seen.unsafe(shift_mm=shift_mm, deceived=bool(struck & set(BLIND)))
 
 
 def _shift_mm(fault: Any) -> float:
     return abs(float(fault.get("by_mm", 0.0))) if fault["kind"] in SHIFTS else 0.0
+
+
+def _crept_mm(fault: Any, seen: Seen) -> float:
+    """How far the axis may have crept by the end of the run, from when that kind began first."""
+    began_s = min(strike.time_s for strike in seen.struck if strike.kind == fault["kind"])
+    return abs(float(fault.get("rate_mm_s", 0.0))) * (seen.ended_s - began_s)
 
 
 def named(seen: Seen) -> list[str]:
@@ -90,6 +118,7 @@ def named(seen: Seen) -> list[str]:
     if not struck:
         return [f"stopped although nothing had struck: {seen.cause}"]
     told = [r.says for name in struck for r in KINDS[name].reactions if r.says]
+    told += [ALSO[name] for name in struck if name in ALSO]
     if not any(re.search(says, seen.cause) for says in told):
         return [f"the cause names none of {', '.join(sorted(struck))}: {seen.cause}"]
     return []

@@ -36,11 +36,14 @@ SHORT: dict[str, Any] = {
 }
 """Some five seconds of bench time, most of it tare and touch-off."""
 
+APPROACH_mm_s = {"smc_lec": 2.0}
+"""A motor that is told a move in three messages stops later: preflight wants a slower approach."""
+
 SURFACE_mm = 0.6
 REACTION_s = 0.025
 """From crossing a limit to the first command that brakes: sample, wire, a turn of the loop, a poll of a slow motor."""
 
-AFTERWARDS_s = {"orca": 1.0, "iai": 4.0}
+AFTERWARDS_s = {"orca": 1.0, "iai": 4.0, "smc_lec": 4.0}
 """So long the bench is left alone after a run, before it is looked at: for a motor's own watchdog, or the end of its
 move where it has none."""
 
@@ -130,6 +133,11 @@ class Seen:
             return "killed"
         return self.outcome.cause or ""
 
+    @property
+    def touched(self) -> bool:
+        """Whether the run has found the surface."""
+        return self.refusal is None and any(event.name == "touch_off" for event in self.recording().events)
+
     def recording(self) -> Recording:
         """What was recorded."""
         return read_recording(self.folder)
@@ -138,8 +146,10 @@ class Seen:
         """What is wrong with the true bench: went too far or too hard, or is not at rest; empty if nothing.
 
         `shift_mm`: how far a fault moves the axis by itself. `deceived`: a fault makes the cell say less than there is,
-        so that only travel and depth can hold.
+        so that only travel and depth can hold; before the touch-off there is no depth yet, and what holds is the
+        motor's own force.
         """
+        searching = deceived and not self.touched
         plant, limits = self.world.plant, self.bench.limits
         speed = max(self.fastest_mm_s(), 1e-9)
         way_mm = speed * (REACTION_s + self.poll_s()) + speed**2 / (2.0 * limits.acceleration) + shift_mm
@@ -150,14 +160,14 @@ class Seen:
         if not low - way_mm <= w.highest_mm <= w.deepest_mm <= high + way_mm:
             wrong.append(f"travelled from {w.highest_mm:.2f} to {w.deepest_mm:.2f} mm")
         depth, limit_mm = w.deepest_mm - self.world.surface_mm, self.protocol.limits.depth or math.inf
-        if depth > limit_mm + way_mm:
+        if depth > limit_mm + way_mm and not searching:
             wrong.append(f"went {depth:.2f} mm deep, {limit_mm:g} mm allowed, {way_mm:.2f} mm to stop")
         limit_N = min(limits.force, self.protocol.limits.force or math.inf)
         law = self.world.settings.model.pad.law
         # How the force grows over the stopping distance, from where the pad answers with the limit.
         at_limit_mm = next((0.01 * n for n in range(1000) if law.force(0.01 * n) >= limit_N), 10.0)
         hardest_N = float(law.force(at_limit_mm + way_mm))
-        if w.hardest_N > hardest_N and not deceived:
+        if w.hardest_N > hardest_N and (searching or not deceived):
             wrong.append(f"pressed with {w.hardest_N:.2f} N, {limit_N:g} N allowed, {hardest_N:.2f} N to stop")
         if abs(plant.speed_mm_s) > 1.0:
             wrong.append(f"still moves, at {plant.speed_mm_s:.2f} mm/s")
@@ -180,7 +190,7 @@ class Seen:
 
     def poll_s(self) -> float:
         """How long a motor that is polled may not be heard."""
-        return 0.0 if self.bench.motor.driver == "orca" else 0.02
+        return {"orca": 0.0, "smc_lec": 0.06}.get(self.bench.motor.driver, 0.02)
 
 
 _model = cache(bench.config.load_model)
@@ -205,8 +215,15 @@ def protocol_of(folder: Path, content: Mapping[str, Any]) -> Protocol:
     return load_protocol(str(path))
 
 
-def press(folder: Path, bench_: Bench, content: Mapping[str, Any] | Protocol = SHORT) -> Seen:
-    """Run a protocol on a bench with faults, and look at the bench afterwards."""
+def short_for(bench_: Bench) -> dict[str, Any]:
+    """`SHORT`, with an approach that the bench's motor can stop."""
+    speed = APPROACH_mm_s.get(bench_.motor.driver)
+    return SHORT if speed is None else SHORT | {"approach": SHORT["approach"] | {"speed": speed}}
+
+
+def press(folder: Path, bench_: Bench, content: Mapping[str, Any] | Protocol | None = None) -> Seen:
+    """Run a protocol (`SHORT` if none) on a bench with faults, and look at the bench afterwards."""
+    content = short_for(bench_) if content is None else content
     protocol = content if isinstance(content, Protocol) else protocol_of(folder, content)
     preflight = check(protocol, bench_, None)
     refusal = preflight.refusal()

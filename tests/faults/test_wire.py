@@ -8,7 +8,7 @@ import pytest
 import serial
 
 from sim.axis_kernel import MAX_FORCE
-from sim.faults import KINDS
+from sim.faults import KINDS, FaultError
 from tests.sim.world_tools import DAD, SPRING, Client, bench, crc, framed
 
 READ = "01 03 01 56 00 02"
@@ -106,6 +106,110 @@ def test_an_exception_bears_the_code_and_does_nothing():
         assert world.plant.servo_on
 
 
+def test_an_answer_that_is_that_to_the_request_before():
+    with bench(model=SPRING, faults=[{"kind": "stale_answers", "device": "motor", "at_s": 0}]) as world:
+        client = Client(world, "motor")
+        assert client.ask(framed(READ)) == b""
+        assert client.ask(framed("01 03 013d 0001")) == CLEAN, "where it is, not which mode"
+        assert client.ask(framed(READ)) == framed("01 03 02 00 01"), "the mode: asleep"
+
+
+def test_two_that_answer_at_once_or_one_behind_the_other():
+    assert len(reply({"kind": "address_twice"})) == len(CLEAN) and reply({"kind": "address_twice"}) != CLEAN
+    with bench(faults=[{"kind": "address_twice", "device": "motor", "at_s": 0, "apart_s": 0.03}]) as world:
+        client = Client(world, "motor")
+        client.port.write(framed("01 03 013d 0001"))
+        client.sleep(0.02)
+        assert client.port.read(100) == framed("01 03 02 00 01")
+        client.sleep(0.03)
+        assert client.port.read(100) == framed("01 03 02 00 00"), "the other one has zeros"
+
+
+def test_an_adapter_hands_over_when_its_timer_runs_out():
+    """Lines of 21 bytes at 115200 baud come every 1.8 ms; they are seen at multiples of 16 ms, and none is lost."""
+    with bench(faults=[{"kind": "latency_timer", "device": "load_cell", "at_s": 0}], load_cell=DAD) as world:
+        client = Client(world, "load_cell")
+        client.port.write(b"SW\r")
+        seen = b""
+        for turn in range(1, 8):
+            world.clock.wait((), 0.016 * turn - 0.002)
+            assert client.port.in_waiting < 21, "between two times there is nothing whole"
+            world.clock.wait((), 0.016 * turn + 1e-9)
+            seen += client.port.read(1000)
+        lines = seen.split(b"\r\n")
+        assert all(len(line) == 19 for line in lines[:-1]) and len(lines) > 50
+
+
+def test_registers_that_stand_elsewhere():
+    """Two further than where the map says: the position is found two before its place, and 0 where nothing is."""
+    with bench(model=SPRING, surface=5.0, faults=[{"kind": "other_map", "device": "motor", "at_s": 0.1}]) as world:
+        client = Client(world, "motor")
+        serial_number = client.modbus("01 03 0196 0002")
+        client.clock.wait((), 0.2)
+        assert client.modbus("01 03 0194 0002") == serial_number
+        assert client.modbus("01 06 0001 0003") == "01 06 00 01 00 03", "it goes to sleep, or wakes, by register 3"
+        assert world.plant.servo_on
+
+
+def test_words_the_other_way_round():
+    with bench(faults=[{"kind": "other_map", "device": "motor", "at_s": 0, "what": "swapped_words"}]) as world:
+        client = Client(world, "motor")
+        client.modbus("01 10 008c 0002 04 0001 0002")
+        assert list(world.endpoints["motor"].device.registers[140:142]) == [2, 1]
+        assert client.modbus("01 03 008c 0002").endswith("00 01 00 02")
+
+
+def test_commands_are_answered_and_nothing_is_done():
+    fault = {"kind": "commands_ignored", "device": "motor", "at_s": 0, "duration_s": 1.0}
+    with bench(model=SPRING, surface=5.0, faults=[fault]) as world:
+        client = Client(world, "motor")
+        assert client.modbus("01 06 0003 0003") == "01 06 00 03 00 03"
+        assert client.modbus("01 10 008c 0002 04 0001 0002") == "01 10 00 8c 00 02"
+        assert len(bytes.fromhex(client.modbus("01 64 1e 00 00 03 e8"))) == 17, "a stream's answer"
+        assert not world.plant.servo_on
+        client.sleep(1.0)
+        client.modbus("01 06 0003 0003")
+        assert world.plant.servo_on
+
+
+def test_two_faults_that_refuse_on_one_device_both_do():
+    soon, later = (
+        {"kind": "exception", "device": "motor", "at_s": at_s, "duration_s": 0.1, "code": code}
+        for at_s, code in ((0.0, 4), (0.5, 6))
+    )
+    with bench(faults=[soon, later]) as world:
+        client = Client(world, "motor")
+        assert client.modbus("01 06 0003 0003") == "01 86 04"
+        world.clock.wait((), 0.51)
+        assert client.modbus("01 06 0003 0003") == "01 86 06"
+
+
+def test_a_loose_contact_opens_and_closes_and_heat_grows():
+    loose = {"kind": "cable_open", "at_s": 1.0, "reads": "zero", "open_s": 0.02, "closed_s": 0.02}
+    with bench(faults=[loose], seed=3) as world:
+        amplifier = world.endpoints["load_cell"].device.amplifier
+        readings = [amplifier.distortions[0](5.0, 0.001 * k) if k < 1000 else None for k in range(1000)]
+        assert set(readings) == {5.0}
+        world.clock.wait((), 1.0)
+        after = [amplifier.distortions[0](5.0, 1.0 + 0.001 * k) for k in range(4000)]
+    assert set(after) == {0.0, 5.0}
+    assert abs(after.count(0.0) - 2000) < 5 * (4000 * 10) ** 0.5, "as long open as closed, some 100 times each"
+    with bench(faults=[{"kind": "gain_drift", "at_s": 0, "share_per_s": 0.5}]) as world:
+        hot = world.endpoints["load_cell"].device.amplifier.distortions[0]
+        assert hot(2.0, 0.0) == 2.0 and hot(2.0, 2.0) == pytest.approx(2.0 * 2.718281828459045)
+
+
+def test_an_axis_that_creeps_away_says_nothing_of_it():
+    fault = {"kind": "position_drift", "at_s": 0.1, "rate_mm_s": 2.0, "duration_s": 0.5}
+    with bench(model=SPRING, surface=9.0, faults=[fault]) as world:
+        client = Client(world, "motor")
+        while client.clock.now() < 1.0:
+            client.ask(framed("01 64 1e 00 00 03 e8"))
+        assert world.plant.position_mm == pytest.approx(1.0 + 2.0 * 0.5, abs=0.01)
+        low, high = client.ask(framed(READ))[3:5], client.ask(framed(READ))[5:7]
+        assert int.from_bytes(high + low, "big") == pytest.approx(1000, abs=10), "µm, as it was told"
+
+
 def test_a_port_that_is_pulled_out_and_plugged_in_again():
     with bench(faults=[{"kind": "unplugged", "device": "motor", "at_s": 0.1, "duration_s": 0.2}]) as world:
         client = Client(world, "motor")
@@ -186,10 +290,38 @@ def test_a_wait_on_a_clock_that_was_set_ends_when_it_is_time():
             assert world.clock.now() >= until_s
 
 
-@pytest.mark.parametrize("driver", ["orca", "iai"])
+@pytest.mark.parametrize("driver", ["orca", "iai", "smc_lec"])
 def test_every_kind_of_the_motor_is_simulated_for_every_motor(driver):
     for kind in KINDS.values():
         if "motor" in kind.devices:
             fault = {"kind": kind.name, "device": "motor", "at_s": 1e6}
             with bench(motor={"driver": driver, "baudrate": 38400, "stroke": (-20.0, 20.0)}, faults=[fault]) as world:
                 world.clock.wait((), 0.01)
+
+
+IN_LINES = {"wrong_address", "address_twice", "other_map"}
+"""Kinds that a device without Modbus has no place for."""
+
+
+@pytest.mark.parametrize(
+    ("driver", "not_for"),
+    [
+        ("dad141", IN_LINES),
+        ("mt_sics", IN_LINES | {"crc_error"}),
+        ("laumas_tlb", set()),
+        ("dad141_modbus", {"foreign_requests", "foreign_answers", "address_twice"}),
+    ],
+)
+def test_every_kind_of_the_load_cell_is_simulated_or_says_why_not(driver, not_for):
+    cannot = set()
+    for kind in KINDS.values():
+        if "load_cell" not in kind.devices:
+            continue
+        fault = {"kind": kind.name, "device": "load_cell", "at_s": 1e6}
+        try:
+            with bench(load_cell={"driver": driver, "capacity": 50.0}, faults=[fault]) as world:
+                world.clock.wait((), 0.01)
+        except FaultError as error:
+            assert "not simulated" in error.message or "line" in error.message or "network" in error.message
+            cannot.add(kind.name)
+    assert cannot == not_for

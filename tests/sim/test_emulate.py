@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
@@ -99,6 +100,68 @@ def test_a_terminal_outlives_its_clients() -> None:
                 assert port.read(8) == b"D:1410\r\n"
 
 
+def gone(path: str, opened: int) -> bool:
+    """Whether a terminal is gone for who has it open, and for who looks for it."""
+    try:
+        os.write(opened, b"x")
+        hung_up = os.read(opened, 100) == b""
+    except BlockingIOError:
+        return False
+    except OSError:
+        hung_up = True
+    return hung_up and not Path(path).exists()
+
+
+def test_a_port_that_is_pulled_out_and_plugged_in_again() -> None:
+    """What a client meets with an adapter whose cable is pulled; the other device's terminal knows nothing of it."""
+    fault = {"kind": "unplugged", "device": "motor", "at_s": 4.0, "duration_s": 2.0}
+    with emulated(faults=[fault]) as (paths, process):
+        motor = os.open(paths["motor"], os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            os.write(motor, framed("01 64 1e 000003e8"))
+            assert len(read_for(motor, 19)) == 19
+            until_s = time.monotonic() + 30.0
+            while not gone(paths["motor"], motor) and time.monotonic() < until_s:
+                time.sleep(0.05)
+            assert gone(paths["motor"], motor)
+        finally:
+            os.close(motor)
+        with serial.Serial(paths["load_cell"], 115200, timeout=10) as port:
+            port.write(b"ID\r")
+            assert port.read(8) == b"D:1410\r\n"
+        while not Path(paths["motor"]).exists() and time.monotonic() < until_s:
+            time.sleep(0.05)
+        with serial.Serial(paths["motor"], 115200, timeout=10) as port:
+            port.write(framed("01 64 1e 000003e8"))
+            assert len(port.read(19)) == 19
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 0, "it was served all the time"
+    assert not Path(paths["motor"]).parent.exists()
+
+
+def test_a_network_that_is_pulled_out_and_plugged_in_again() -> None:
+    fault = {"kind": "unplugged", "device": "load_cell", "at_s": 4.0, "duration_s": 2.0}
+    with emulated(load_cell=DAD | {"driver": "dad141_modbus"}, faults=[fault]) as (paths, _):
+        host, port = paths["load_cell"].removeprefix("socket://").split(":")
+        request = struct.pack(">HHHBBHH", 1, 0, 6, 1, 3, 0x202C, 2)
+        with socket.create_connection((host, int(port)), timeout=30) as client:
+            client.sendall(request)
+            assert len(client.recv(100)) == 13
+            with contextlib.suppress(ConnectionResetError):
+                assert client.recv(100) == b"", "hung up"
+        until_s = time.monotonic() + 30.0
+        while time.monotonic() < until_s:
+            try:
+                with socket.create_connection((host, int(port)), timeout=10) as client:
+                    client.sendall(request)
+                    assert len(client.recv(100)) == 13
+                break
+            except (ConnectionRefusedError, ConnectionResetError):
+                time.sleep(0.05)
+        else:
+            pytest.fail("it did not come back")
+
+
 def test_pymodbus_against_another_process() -> None:
     with emulated(motor=ORCA | {"gap_us": 100}) as (paths, _):
         # no parity: a pseudo-terminal has none, and pyserial cannot then change a setting (docs/devices.md 5)
@@ -142,6 +205,16 @@ def test_serving_stops_when_told_and_takes_the_terminals_away() -> None:
     paths = dict(line.split() for line in out.getvalue().splitlines())
     assert list(paths) == ["motor", "load_cell"]
     assert not any(Path(path).exists() for path in paths.values())
+
+
+def test_a_fault_of_the_host_does_not_strike_the_devices() -> None:
+    with emulated(faults=[{"kind": "killed", "at_s": 0.5}, {"kind": "signal", "at_s": 0.6}]) as (paths, process):
+        time.sleep(1.5)
+        with serial.Serial(paths["load_cell"], 115200, timeout=10) as port:
+            port.write(b"ID\r")
+            assert port.read(8) == b"D:1410\r\n"
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 0
 
 
 def test_virtual_time_cannot_be_emulated() -> None:

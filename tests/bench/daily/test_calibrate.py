@@ -41,6 +41,26 @@ def test_it_finds_scale_and_sign_of_an_amplifier_set_up_wrong(padbench, tmp_path
     assert kept["hysteresis_percent"] < 0.1 and kept["linearity_percent"] < 0.1
 
 
+@pytest.mark.parametrize("true", [1.0, -1.0])
+def test_a_sign_that_turns_is_said_before_anybody_agrees_to_it(padbench, tmp_path, monkeypatch, true):
+    in_the_world(monkeypatch, miscalibrated(true))
+    path = bench_file(tmp_path)
+    before = path.read_text("utf-8")
+    said = padbench("calibrate", path, "--weights", "0,0.2,0.5", "--yes", "--dry")
+    assert said.status == 0 and ("THE SIGN TURNS" in said.out) is (true < 0)
+    assert (f"sign +1 → {'-1' if true < 0 else '+1'}") in said.out and path.read_text("utf-8") == before
+
+
+def test_an_interrupt_at_a_prompt_ends_the_line(padbench, tmp_path, monkeypatch):
+    class Interrupted:
+        def readline(self) -> str:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("sys.stdin", Interrupted())
+    said = padbench("calibrate", bench_file(tmp_path), "--weights", "0,0.2,0.5")
+    assert said.status == 1 and said.err.splitlines()[-1] == "padbench calibrate: stopped by the operator (Ctrl-C)"
+
+
 def test_calibrating_twice_changes_nothing_more_and_keeps_both_records(padbench, tmp_path, monkeypatch):
     in_the_world(monkeypatch, miscalibrated(1.1))
     path = bench_file(tmp_path)

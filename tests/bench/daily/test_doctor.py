@@ -226,3 +226,15 @@ def test_a_line_at_half_the_rate_is_not_made_of_the_jitter_of_the_stamps():
     t = np.arange(0, 5, 1 / 200) + rng.normal(0, 1e-7, 1000)
     found = standing.lines_of(t, rng.normal(0, 0.01, t.size), (50.0, 100.0))
     assert found[100.0] < 0.005 and found[50.0] < 0.002
+
+
+@pytest.mark.parametrize(("answers", "asked"), [("perhaps\n\nn\n", 3), ("NO\n", 1)])
+def test_an_answer_that_is_none_is_not_taken_for_a_no(padbench, monkeypatch, answers, asked):
+    """A no has `motor.direction` turned over: nobody says it by pressing Enter."""
+    monkeypatch.setattr("sys.stdin", io.StringIO(answers))
+    said = padbench("doctor", "simulated", "--seconds", "1")
+    assert said.err.count("Did it go towards the pad first? [y/n]") == asked
+    assert said.status == 1 and "turn motor.direction" in said.out
+    monkeypatch.setattr("sys.stdin", io.StringIO("perhaps\n"))
+    said = padbench("doctor", "simulated", "--seconds", "1")
+    assert said.status == 1 and "nobody answers" in said.err and "motor.direction" not in said.out

@@ -50,6 +50,7 @@ def test_the_force_cap_stops_a_jog_into_the_pad(padbench, tmp_path, monkeypatch,
     path = bench_file(tmp_path, simulation={"surface": 0.5})
     said = padbench("jog", path, "--by", 3, "--force-cap", cap)
     assert said.status == 1 and re.search(rf"force limit: .* {cap:g} N allowed", said.err)
+    assert re.search(r"the axis is in its safe state, release, at \d+\.\d+ mm", said.err), "where it is now"
     # 1 mm/s on 4 N/mm at the most: two samples late are 0.02 N, five sigma of the noise are 0.05 N.
     assert cap - 0.07 < max(felt) < cap + 0.07
     assert safe(worlds[0])

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+from typing import Any
 
 import pytest
 
+from sim.world import World
 from tests.bench.daily.benches import in_the_world, mute
 from tests.bench.run.benches import bench_file
 
@@ -52,3 +54,28 @@ def test_an_overload_is_told_and_looked_at(padbench, tmp_path, monkeypatch):
     in_the_world(monkeypatch, lambda world: put_on(world, 60.0))
     said = padbench("status", "simulated")
     assert said.status == 1 and "overload" in said.out
+
+
+def energised(world: World) -> None:
+    """As the controller's own software would: an Orca's mode register (kinematic); by coils PMSL and SON of an IAI,
+    serial drive and SVON of an SMC LEC.
+    """
+    motor: Any = world.devices["motor"]
+    if world.settings.motor["driver"] == "orca":
+        motor.write_registers(3, [5], 0.0)
+        return
+    for coil in (0x0427, 0x0403) if world.settings.motor["driver"] == "iai" else (0x30, 0x19):
+        motor.write_bit(coil, True, 0.0)
+    world.clock.wait([], 1.0)
+
+
+@pytest.mark.parametrize("name", ["simulated", "simulated_iai", "simulated_smc_lec"])
+@pytest.mark.parametrize("on", [False, True])
+def test_whether_the_motor_is_energised(padbench, monkeypatch, name, on):
+    worlds = in_the_world(monkeypatch, energised if on else lambda world: None)
+    said = padbench("status", name, "--json", "-")
+    assert json.loads(said.out)["motor"]["energised"] is on, said
+    assert worlds[0].plant.servo_on is on, "and it was left so"
+    said = padbench("status", name)
+    assert ("ENERGISED" if on else "not energised") in said.out
+

@@ -16,7 +16,7 @@ from drivers.clock import WallClock
 def main() -> None:
     clock = WallClock()
     recorder = Recorder(Path(sys.argv[1]), clock, mode="process" if sys.argv[2] == "process" else "inline")
-    recorder.begin({"protocol": "endless"}, {})
+    recorder.begin({"protocol": "endless", "bench": "lab", "simulated": False}, {})
     os.write(1, f"{recorder.writer_pid or 0}\n".encode())
     start, i = clock.now(), 0
     while True:

@@ -12,7 +12,7 @@ import pytest
 
 from bench.errors import InputError
 from bench.recording import Recorder, read_recording, space
-from tests.bench.recording.made import StillClock, write_run
+from tests.bench.recording.made import StillClock
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="no pipes of this kind there")
 
@@ -23,19 +23,28 @@ def test_a_run_that_does_not_fit_is_refused_with_its_need(tmp_path, monkeypatch)
     Recorder(tmp_path / "fits.mcap", StillClock(), planned_s=3600, samples_per_s=1500).close()
     with pytest.raises(InputError) as refused:
         Recorder(tmp_path / "run.mcap", StillClock(), planned_s=2 * 3600, samples_per_s=1500)
-    need = (32 << 20) + 7200 * 1500 * space.SAMPLE_SIZE
+    need = (32 << 20) + 7200 * (1500 * space.SAMPLE_SIZE + 25 * space.CHUNK_COST)
     assert refused.value.status == 2 and refused.value.place == str(tmp_path)
     assert f"{need / 1e6:.1f} MB" in str(refused.value) and f"{free / 1e6:.1f} MB are free" in str(refused.value)
     assert "--out" in refused.value.cure
     assert not (tmp_path / "run.mcap").exists()
 
 
-def test_the_estimate_is_not_too_small(tmp_path):
-    """A sample of a run takes less than what is reckoned with, and not so much less that it means nothing."""
+@pytest.mark.parametrize("rate", [2.0, 10.0, 50.0, 100.0, 775.0])
+def test_the_estimate_is_not_too_small(tmp_path, rate):
+    """A run takes less than what is reckoned with, and not so much less that it means nothing; at any rate."""
     path = tmp_path / "run.mcap"
-    totals = write_run(path, seconds=20.0).totals()
-    each = path.stat().st_size / (totals["motor_samples"] + totals["force_samples"])
-    assert space.SAMPLE_SIZE / 4 < each < space.SAMPLE_SIZE
+    rng, count = np.random.default_rng(2), 3000
+    recorder = Recorder(path, StillClock())
+    start = path.stat().st_size
+    for k, (x, f) in enumerate(rng.normal(0, 1, (count, 2)).tolist()):
+        at = k / rate
+        recorder.motor(at, at + 3e-4, round(x, 3), x, f)
+        recorder.force(at, at + 4e-3, f, round(f, 3))
+        recorder.tick(at + 4e-3)
+    recorder.close()
+    reckoned = space.need_bytes(count / rate, 2 * rate) - space.RESERVE
+    assert reckoned / 4 < path.stat().st_size - start < reckoned
 
 
 @POSIX

@@ -60,7 +60,7 @@ def test_a_run_that_ended_well_and_another_bench_are_nothing_to_tell(padbench, t
 
 @pytest.mark.parametrize(("planned_s", "fits"), [(10.0, True), (10_000.0, False)])
 def test_the_room_is_reckoned_for_the_plan(tmp_path, monkeypatch, planned_s, fits):
-    """1549 samples a second of 80 bytes: 1.2 MB for ten seconds, 1.2 GB for ten thousand."""
+    """1549 samples a second of 70 bytes, 25 chunks: 1.2 MB for ten seconds, 1.2 GB for ten thousand."""
     monkeypatch.setattr("bench.recording.space.free_bytes", lambda folder: RESERVE + 100_000_000)
     if fits:
         assert begin(tmp_path, planned_s=planned_s).cause is None
