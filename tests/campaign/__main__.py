@@ -13,6 +13,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from pathlib import Path
 from typing import Any
 
+from tests.truth.effects import HALVES
+
 from .count import causes, wrongs
 from .judge import run
 from .plan import Item, plan
@@ -84,6 +86,9 @@ def main() -> int:
     parser.add_argument(
         "--outside", type=int, default=0, metavar="N", help="cases with an effect outside the catalogue"
     )
+    parser.add_argument(
+        "--half", choices=(*HALVES, "both"), default="first", help="of the shapes: those known, the judge's, or both"
+    )
     parser.add_argument("--ids", default="", metavar="ID,…", help="cases of these ids alone")
     parser.add_argument("--failing", type=Path, metavar="FILE", help="the failing cases of another campaign instead")
     parser.add_argument("--seed", type=int, default=1, metavar="S")
@@ -104,7 +109,7 @@ def main() -> int:
     else:
         large = args.large if args.large is not None else -(-args.single // 3)
         ids = [id for id in args.ids.split(",") if id]
-        items = plan(args.seed, args.single, large, args.null, args.pairs, args.outside, ids)
+        items = plan(args.seed, args.single, large, args.null, args.pairs, args.outside, ids, args.half)
     known = {line["key"] for line in read(args.out)}
     items = [item for item in items if item.key not in known]
     if items:
@@ -113,7 +118,9 @@ def main() -> int:
     if args.failures:
         print(failures(lines))
     if args.table:
-        command = "python -m tests.campaign --single N --null N --pairs N --outside N --out FILE --table PAGE"
+        command = (
+            "python -m tests.campaign --single N --null N --pairs N --outside N --half both --out FILE --table PAGE"
+        )
         args.table.write_text(page(lines, command), encoding="utf-8")
         print(f"written: {args.table}")
     if not (items or args.failures or args.table):

@@ -1,6 +1,7 @@
 """Which cases a campaign draws. Each is decided by the campaign's seed, its group, its ids and its number in the group.
 
-A larger campaign of the same seed holds the smaller one, so that a file of results can be carried on.
+A larger campaign of the same seed holds the smaller one, so that a file of results can be carried on. The two halves
+of the shapes have cases of their own; those with nothing hidden are the same for both.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tests.truth.cases import NOISES, Case, draw_case
-from tests.truth.effects import EFFECTS
+from tests.truth.effects import EFFECTS, HALVES
 
 CATALOGUE = (
     *("frame_compliance", "backlash", "contact_offset", "friction", "inertia", "resonance", "cogging", "force_delay"),
@@ -41,6 +42,7 @@ class Item:
     sizes: tuple[float, ...]
     seed: int
     noise: str | None = None
+    half: str = "first"
 
     @property
     def key(self) -> str:
@@ -69,16 +71,21 @@ def _stream(seed: int, group: str, what: str, number: int) -> np.random.Generato
     return np.random.default_rng([seed, zlib.crc32(f"{group}/{what}".encode()), number])
 
 
-def _item(group: str, ids: tuple[str, ...], number: int, rng: np.random.Generator, noise: str | None = None) -> Item:
+def _item(
+    group: str,
+    ids: tuple[str, ...],
+    number: int,
+    rng: np.random.Generator,
+    noise: str | None = None,
+    half: str = "first",
+) -> Item:
     low, high = np.log(SIZES.get(group, (1.0, 1.0)))
     sizes = tuple(float(f"{np.exp(rng.uniform(low, high)):.4g}") for _ in ids)
     # A single id goes through its shapes in turn, from another one for each id; in company they are drawn.
     turn = number + zlib.crc32(f"{group}/{ids}".encode())
-    shapes = tuple(
-        EFFECTS[id].shapes[turn % len(EFFECTS[id].shapes)] if len(ids) == 1 else str(rng.choice(EFFECTS[id].shapes))
-        for id in ids
-    )
-    return Item(group, ids, shapes, sizes, int(rng.integers(2**31)), noise)
+    known = [EFFECTS[id].of(half) for id in ids]
+    shapes = tuple(own[turn % len(own)] if len(ids) == 1 else str(rng.choice(own)) for own in known)
+    return Item(group, ids, shapes, sizes, int(rng.integers(2**31)), noise, half)
 
 
 def _compatible(first: str, second: str) -> bool:
@@ -87,8 +94,12 @@ def _compatible(first: str, second: str) -> bool:
     return laws and (a.contact is None or b.contact is None or a.contact == b.contact)
 
 
-def _pair(rng: np.random.Generator) -> tuple[str, str]:
-    known = [id for id in CATALOGUE if id in EFFECTS]
+def _known(half: str) -> list[str]:
+    return [id for id in CATALOGUE if id in EFFECTS and EFFECTS[id].of(half)]
+
+
+def _pair(rng: np.random.Generator, half: str) -> tuple[str, str]:
+    known = _known(half)
     while True:
         first, second = sorted(str(id) for id in rng.choice(known, 2, replace=False))
         if _compatible(first, second):
@@ -96,40 +107,55 @@ def _pair(rng: np.random.Generator) -> tuple[str, str]:
 
 
 def plan(
-    seed: int, single: int, large: int, null: int, pairs: int, outside: int, ids: Iterable[str] = ()
+    seed: int,
+    single: int,
+    large: int,
+    null: int,
+    pairs: int,
+    outside: int,
+    ids: Iterable[str] = (),
+    half: str = "first",
 ) -> list[Item]:
     """Cases in an order in which all groups go forward together: `single`, `large` for each id, the others in all.
 
-    `ids`: cases of these alone (null cases then only where no id is named).
+    `ids`: cases of these alone (null cases then only where no id is named). `half`: of the shapes; `both` has as many
+    cases of either.
     """
     wanted = set(ids)
-    known = [id for id in CATALOGUE if id in EFFECTS]
-    beyond = sorted(set(EFFECTS) - set(CATALOGUE))
-    placed: list[tuple[float, Item]] = []
+    nulls = [_item("null", (), k, _stream(seed, "null", "", k), NOISES[k % len(NOISES)]) for k in range(null)]
+    placed = [((k + 0.5) / null, item) for k, item in enumerate(nulls)]
+    for name in HALVES if half == "both" else (half,):
+        placed += _hidden(seed, {"single": single, "large": large, "pair": pairs, "outside": outside}, name)
+    placed.sort(key=lambda pair: (pair[0], GROUPS.index(pair[1].group)))
+    return [item for _, item in placed if not wanted or wanted & set(item.ids)]
 
-    def place(group: str, count: int, made: Iterable[Item]) -> None:
+
+def _hidden(seed: int, counts: dict[str, int], half: str) -> list[tuple[float, Item]]:
+    """Cases of one half with something hidden, each with how far on in its group it stands."""
+    # The first half was there before there were two: its streams go by the group alone.
+    label = "" if half == "first" else f"{half}/"
+    known, placed = _known(half), []
+    beyond = sorted(id for id in set(EFFECTS) - set(CATALOGUE) if EFFECTS[id].of(half))
+
+    def stream(group: str, what: str, number: int) -> np.random.Generator:
+        return _stream(seed, label + group, what, number)
+
+    def place(count: int, made: Iterable[Item]) -> None:
         placed.extend(((k + 0.5) / count, item) for k, item in enumerate(made))
 
-    for group, count in (("single", single), ("large", large)):
+    for group in ("single", "large"):
         rounds = (
-            _item(group, (id,), number, _stream(seed, group, id, number))
-            for number in range(count)
-            for id in _stream(seed, group, "order", number).permutation(known)
+            _item(group, (id,), number, stream(group, id, number), half=half)
+            for number in range(counts[group])
+            # Left as numpy's strings: how they are printed goes into which shape a case has.
+            for id in stream(group, "order", number).permutation(known)
         )
-        place(group, count * len(known), rounds)
-    nulls = ((k, _stream(seed, "null", "", k)) for k in range(null))
-    place("null", null, (_item("null", (), k, rng, NOISES[k % len(NOISES)]) for k, rng in nulls))
+        place(counts[group] * len(known), rounds)
+    drawn = (stream("pair", "", k) for k in range(counts["pair"]))
+    place(counts["pair"], (_item("pair", _pair(rng, half), k, rng, half=half) for k, rng in enumerate(drawn)))
+    turns = ((k, beyond[k % len(beyond)]) for k in range(counts["outside"] if beyond else 0))
     place(
-        "pair",
-        pairs,
-        (_item("pair", _pair(rng), k, rng) for k in range(pairs) for rng in [_stream(seed, "pair", "", k)]),
+        counts["outside"],
+        (_item("outside", (id,), k // len(beyond), stream("outside", id, k), half=half) for k, id in turns),
     )
-    if beyond:
-        turns = ((k, beyond[k % len(beyond)]) for k in range(outside))
-        place(
-            "outside",
-            outside,
-            (_item("outside", (id,), k // len(beyond), _stream(seed, "outside", id, k)) for k, id in turns),
-        )
-    placed.sort(key=lambda pair: pair[0])
-    return [item for _, item in placed if not wanted or wanted & set(item.ids)]
+    return placed

@@ -243,10 +243,10 @@ def _shape(effect: Any, wanted: str | dict[str, str] | None, rng: np.random.Gene
     drawn = str(rng.choice(effect.drawn))
     if isinstance(wanted, dict):
         wanted = wanted.get(effect.id)
-    elif wanted is not None and wanted not in effect.shapes:
+    elif wanted is not None and wanted not in effect.of("both"):
         wanted = None
-    if wanted is not None and wanted not in effect.shapes:
-        raise ValueError(f"{effect.id} has no shape {wanted!r}: one of {effect.shapes}")
+    if wanted is not None and wanted not in effect.of("both"):
+        raise ValueError(f"{effect.id} has no shape {wanted!r}: one of {effect.of('both')}")
     return wanted or drawn
 
 

@@ -7,9 +7,9 @@ the catalogue is one more file here.
 from importlib import import_module
 from pkgutil import iter_modules
 
-from .registry import EFFECTS, Build, Effect, effect, more_shapes
+from .registry import EFFECTS, HALVES, Build, Effect, effect, judge_effect, judge_shapes, more_shapes
 
 for _module in iter_modules(__path__):
     import_module(f"{__name__}.{_module.name}")
 
-__all__ = ["EFFECTS", "Build", "Effect", "effect", "more_shapes"]
+__all__ = ["EFFECTS", "HALVES", "Build", "Effect", "effect", "judge_effect", "judge_shapes", "more_shapes"]

@@ -7,7 +7,9 @@ frame is solved implicitly: the probe stands where  x = y − deflection(F(x)), 
 Sources: friction by Dahl (1968), Stribeck, LuGre (Canudas de Wit et al. 1995), Maxwell slip (Iwan 1966);
 stress softening by Ogden and Roxburgh (1999), exponential (Miehe 1995), Zúñiga and Beatty (2002), Dorfmann and Ogden
 (2003); damage by Kachanov (1958); adhesion after Derjaguin, Muller, Toporov (1975), Johnson, Kendall, Roberts (1971),
-a capillary bridge of constant volume (Maugis 1987). Units: mm, N, s.
+a capillary bridge of constant volume (Maugis 1987), van der Waals forces of a sphere and a plane (Derjaguin 1934,
+Hamaker 1937), a bilinear law of traction and separation (Alfano and Crisfield 2001); joints after Hertz (1882); damage
+by the load (Miner 1945); flow after Eyring (1936). Units: mm, N, s.
 """
 
 from __future__ import annotations
@@ -27,7 +29,7 @@ class Numbers(NamedTuple):
     stick_N: float = 0.0  # tension at which an attached surface lets go
     stick_once: bool = False
     offset_mm: float = 0.0  # surface below the zero of position
-    frame_form: int = 0  # 1 linear, 2 stiffening, 3 softer beyond a preload
+    frame_form: int = 0  # 1 linear, 2 stiffening, 3 softer beyond a preload, 4 Hertz
     frame_mm_N: float = 0.0
     frame_force_N: float = 1.0
     frame_stiff_share: float = 1.0
@@ -38,24 +40,25 @@ class Numbers(NamedTuple):
     stribeck_mm_s: float = 1.0
     bristle_Ns_mm: float = 0.0
     slide_Ns_mm: float = 0.0
-    softening_form: int = 0  # 1 exponential, 2 Ogden–Roxburgh, 3 Zúñiga–Beatty, 4 Dorfmann–Ogden
+    softening_form: int = 0  # 1 exponential, 2 Ogden–Roxburgh, 3 Beatty, 4 Dorfmann–Ogden, 5 ratio
     softening_share: float = 0.0
     softening_mm: float = 1.0
     softening_Nmm: float = 1.0
-    damage_form: int = 0  # 1 exponential, 2 Kachanov, 3 saturating, 4 logarithmic
+    damage_form: int = 0  # 1 exponential, 2 Kachanov, 3 saturating, 4 logarithmic, 5 hyperbolic, 6 by load
     damage_per_mm: float = 0.0
     damage_limit: float = 1.0
     set_form: int = 0  # 1 linear, 2 saturating, 3 beyond a yield depth, 4 progressive
     set_mm_mm: float = 0.0
     set_limit_mm: float = 1.0
-    adhesion_form: int = 0  # 1 exponential, 2 snaps off, 3 neck, 4 capillary bridge
+    adhesion_form: int = 0  # 1 exponential, 2 snaps off, 3 neck, 4 bridge, 5 van der Waals, 6 bilinear
     pull_off_N: float = 0.0
     adhesion_mm: float = 1.0
-    damping_form: int = 0  # 1 linear, 2 proportional to depth, 3 thinning, 4 thickening
+    damping_form: int = 0  # 1 linear, 2 with depth, 3 thinning, 4 thickening, 5 Eyring, 6 one-sided
     damping_Ns_mm: float = 0.0
     damping_ref: float = 1.0
-    rate_form: int = 0  # 1 linear, 2 exponential, 3 saturating, 4 free volume
+    rate_form: int = 0  # 1 linear, 2 exponential, 3 saturating, 4 free volume, 5 up to a knee, 6 each mode its own
     rate_per_mm: float = 0.0
+    rate_knee_mm: float = 1.0
     table_mm: float = 1e-3
 
 
@@ -103,6 +106,8 @@ def _elastic(p, table, depth, deepest, keep):
         elif p.softening_form == 4:
             lost = _energy(table, deepest, p.table_mm) - _energy(table, depth, p.table_mm)
             u *= 1 - p.softening_share * math.tanh(lost / p.softening_Nmm)
+        elif p.softening_form == 5:
+            u *= (depth / deepest) ** p.softening_share
         else:
             u *= math.exp(-p.softening_share * math.sqrt(below / p.softening_mm))
     return u
@@ -113,12 +118,14 @@ def _kept(p, path):
     """Share of the stiffness that is left after a path of loading, mm."""
     if p.damage_form == 0:
         return 1.0
-    if p.damage_form == 1:
+    if p.damage_form == 1 or p.damage_form == 6:
         return math.exp(-p.damage_per_mm * path)
     if p.damage_form == 2:  # dD/dλ = r / (1 − D)²
         return max(1 - 3 * p.damage_per_mm * path, 0.01) ** (1 / 3)
     if p.damage_form == 4:
         return max(1 - p.damage_per_mm * p.damage_limit * math.log1p(path / p.damage_limit), 0.01)
+    if p.damage_form == 5:
+        return 1 / (1 + p.damage_per_mm * path)
     return 1 + p.damage_limit * math.expm1(-p.damage_per_mm * path / p.damage_limit)
 
 
@@ -144,6 +151,10 @@ def _damped(p, speed, depth):
         return p.damping_Ns_mm * speed
     if p.damping_form == 2:
         return p.damping_Ns_mm * speed * depth / p.damping_ref
+    if p.damping_form == 5:
+        return p.damping_Ns_mm * p.damping_ref * math.asinh(speed / p.damping_ref)
+    if p.damping_form == 6:
+        return p.damping_Ns_mm * speed * (1 + math.copysign(p.damping_ref, speed))
     exponent = 0.7 if p.damping_form == 3 else 1.3
     return math.copysign(p.damping_Ns_mm * p.damping_ref * (abs(speed) / p.damping_ref) ** exponent, speed)
 
@@ -187,6 +198,9 @@ def _deflection(p, force):
         return p.frame_stiff_share * p.frame_mm_N * force
     if p.frame_form == 3:
         return p.frame_mm_N * (force - (1 - p.frame_stiff_share) * p.frame_force_N)
+    if p.frame_form == 4:
+        pressed = (1 + abs(force) / p.frame_force_N) ** (2 / 3) - 1
+        return math.copysign(1.5 * p.frame_mm_N * p.frame_force_N * pressed, force)
     return p.frame_mm_N * force
 
 
@@ -215,7 +229,10 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
     inner = max(depth, 0.0)
     was = state[_CONTACT] > 0
     new[_DEEPEST] = max(state[_DEEPEST], depth)
-    new[_PATH] = state[_PATH] + max(inner - state[_S], 0.0)
+    way = max(inner - state[_S], 0.0)
+    if p.damage_form == 6:
+        way *= (inner + state[_S]) / p.damage_limit
+    new[_PATH] = state[_PATH] + way
     keep = gain * _kept(p, new[_PATH])
     u = _elastic(p, table, inner, new[_DEEPEST], keep)
     # F = held u − remembered, since z(h) = u − (u − u_0) k + (z_0 − u_0) e with k = (1 − e)/(ν h).
@@ -254,6 +271,10 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
             new[_ATTACHED] = 0.0
         if p.adhesion_form == 1:
             force -= p.pull_off_N * math.exp(-gap / p.adhesion_mm)
+        elif p.adhesion_form == 5:
+            force -= p.pull_off_N / (1 + gap / p.adhesion_mm) ** 2
+        elif new[_ATTACHED] > 0 and p.adhesion_form == 6:
+            force -= p.pull_off_N * min(4 * gap, (p.adhesion_mm - gap) * 4 / 3) / p.adhesion_mm
         elif new[_ATTACHED] > 0 and p.adhesion_form == 4:
             force -= p.pull_off_N * (1 - gap / math.sqrt(gap * gap + p.adhesion_mm * p.adhesion_mm))
         elif new[_ATTACHED] > 0 and p.adhesion_form == 2:
@@ -274,7 +295,13 @@ def _rates(p, nu, factor, depth, e, k):
         factor *= max(1 + p.rate_per_mm * depth / (1 + depth / 4), 0.1)
     elif p.rate_form == 4:
         factor *= math.exp(p.rate_per_mm * depth / (1 + depth / 4))
+    elif p.rate_form == 5:
+        factor *= max(1 + p.rate_per_mm * min(depth, p.rate_knee_mm), 0.1)
+    plain = factor
     for i in range(nu.shape[0]):
+        if p.rate_form == 6:  # from 1.5 times the slope for the first mode to half of it for the last
+            weight = 1.5 - i / (nu.shape[0] - 1) if nu.shape[0] > 1 else 1.0
+            factor = plain * math.exp(weight * p.rate_per_mm * depth)
         e[i] = math.exp(-nu[i] * factor * p.step_s)
         k[i] = -math.expm1(-nu[i] * factor * p.step_s) / (nu[i] * factor * p.step_s)
 

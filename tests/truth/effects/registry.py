@@ -11,6 +11,10 @@ and is asked for by `draw_case(seed, ("warming",))`. The hooks are the lists of 
 
 A further shape of an effect that is there is `@more_shapes("warming", "stepped")` in a module of its own. It is asked
 for by name: what a seed draws by itself stays among the first shapes, so that its cases do not change.
+
+Shapes come in two halves. The first may be looked at while a diagnosis is being written; the `judge` half is written
+by somebody who has not seen that diagnosis, and is there to judge it alone: `@judge_shapes("warming", "sudden")`, and
+`@judge_effect("cooling", "slow")` for an effect that is of that half as a whole.
 """
 
 from __future__ import annotations
@@ -81,11 +85,16 @@ class Build:
 Hide = Callable[[Build, str, float], dict[str, Any]]
 
 
+#: Of the shapes.
+HALVES = ("first", "judge")
+
+
 @dataclass(frozen=True)
 class Effect:
     """An effect by its id: the shapes it takes, what it needs of pad and sampling, and how to hide it.
 
-    shapes: all of them. drawn: the first ones, among which a seed draws.
+    shapes: those of the first half, none where the effect is the judge's. drawn: the ones among which a seed draws.
+    judge: those of the judge half.
     """
 
     id: str
@@ -95,20 +104,38 @@ class Effect:
     contact: str | None = None
     laws: tuple[str, ...] | None = None
     least_rate_hz: float = 0.0
+    judge: tuple[str, ...] = ()
+
+    def of(self, half: str) -> tuple[str, ...]:
+        """The shapes of one half; `both` for all."""
+        return {"first": self.shapes, "judge": self.judge, "both": (*self.shapes, *self.judge)}[half]
 
 
 EFFECTS: dict[str, Effect] = {}
 _FIRST: dict[str, Effect] = {}
 _MORE: dict[str, dict[str, Hide]] = {}
+_JUDGE: dict[str, dict[str, Hide]] = {}
 
 
 def _assemble(id: str, first: Effect) -> None:
-    more = _MORE.get(id, {})
+    more, judge = _MORE.get(id, {}), _JUDGE.get(id, {})
+    others = more | judge
 
     def hide(build: Build, shape: str, size: float) -> dict[str, Any]:
-        return more.get(shape, first.hide)(build, shape, size)
+        return others.get(shape, first.hide)(build, shape, size)
 
-    EFFECTS[id] = replace(first, shapes=(*first.drawn, *more), hide=hide if more else first.hide)
+    shapes = {"shapes": (*first.shapes, *more), "judge": (*first.judge, *judge)}
+    EFFECTS[id] = replace(first, **shapes, hide=hide if others else first.hide)
+
+
+def _further(known: dict[str, dict[str, Hide]], id: str, shapes: tuple[str, ...]) -> Callable[[Hide], Hide]:
+    def register(hide: Hide) -> Hide:
+        known.setdefault(id, {}).update(dict.fromkeys(shapes, hide))
+        if id in _FIRST:
+            _assemble(id, _FIRST[id])
+        return hide
+
+    return register
 
 
 def effect(id: str, *shapes: str, **needs: Any) -> Callable[[Hide], Hide]:
@@ -124,11 +151,20 @@ def effect(id: str, *shapes: str, **needs: Any) -> Callable[[Hide], Hide]:
 
 def more_shapes(id: str, *shapes: str) -> Callable[[Hide], Hide]:
     """Register shapes beyond the first of an effect that is registered before or after."""
+    return _further(_MORE, id, shapes)
+
+
+def judge_shapes(id: str, *shapes: str) -> Callable[[Hide], Hide]:
+    """Register shapes of the judge half of an effect that is registered before or after."""
+    return _further(_JUDGE, id, shapes)
+
+
+def judge_effect(id: str, *shapes: str, **needs: Any) -> Callable[[Hide], Hide]:
+    """Register an effect that is of the judge half as a whole."""
 
     def register(hide: Hide) -> Hide:
-        _MORE.setdefault(id, {}).update(dict.fromkeys(shapes, hide))
-        if id in _FIRST:
-            _assemble(id, _FIRST[id])
+        _FIRST[id] = Effect(id, (), shapes, hide, judge=shapes, **needs)
+        _assemble(id, _FIRST[id])
         return hide
 
     return register
