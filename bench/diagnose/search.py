@@ -33,7 +33,7 @@ WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
-LONGEST_S = 60.0  # after which no further cause is looked for
+LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 MOST_CAUSES = 3
 
 
@@ -247,8 +247,8 @@ class Search:
         """Causes one after the other while each pays; then those that others have made needless go."""
         path = Path([base])
         recurved = False
-        begun = time.perf_counter()
-        while len(path.fits) <= MOST_CAUSES and time.perf_counter() - begun < LONGEST_S:
+        begun = time.process_time()
+        while len(path.fits) <= MOST_CAUSES and time.process_time() - begun < LONGEST_S:
             every = [t for t in self.ranked(path.fits[-1]) if believable(t.fit, self.prepared)]
             present = {c.id for c in path.fits[-1].structure.causes}
             ranked = [t for t in every if t.id not in present]

@@ -78,7 +78,7 @@ def shortened(m: Measurement, depth_mm: float, force_N: float) -> Run:
         u = s.position_mm / depth_mm
         owner = _owners(u, length)
         if first:  # a run's first sample stays alone: the jump from rest to it is part of the motion
-            owner[1:] += 1
+            owner[1:] += len(owner) > 1 and owner[1] == owner[0]
             first = False
         weight = np.asarray(np.bincount(owner, w), dtype=np.float64)
         share = np.where(weight[owner] > 0, w, 1.0)

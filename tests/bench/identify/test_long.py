@@ -66,6 +66,16 @@ def test_blocks_weigh_and_mean_the_same(make) -> None:
     assert run.weight @ run.y**2 < y @ y  # means scatter less
 
 
+@pytest.mark.usefixtures("_short_is_long")
+def test_no_block_is_empty_where_data_begin_in_motion() -> None:
+    """The second sample has a block of its own anyway then, beside the first, which stays alone."""
+    m = data()
+    t, x = m.force_time_s, m.position_mm + 500.0 * np.exp(-m.force_time_s / 1e-3)  # a jump of 200 mm in one sample
+    run = shortened(replace(m, position_mm=x), 2.4, 5.0)
+    assert all(np.isfinite(column).all() for column in (run.time_s, run.u, run.y))
+    assert run.weight.sum() == len(t)
+
+
 @pytest.mark.parametrize("make", [data, two_clocks])
 def test_the_answer_is_the_same(make, request: pytest.FixtureRequest) -> None:
     whole = fit(make(), law="exponential", order=2)
