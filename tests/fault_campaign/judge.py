@@ -11,7 +11,7 @@ from unittest import mock
 
 import bench.run.runner
 from bench.run.folder import RECORDING
-from sim.faults import KINDS, RECOVERED, REFUSED
+from sim.faults import FAMILIES, KINDS, RECOVERED, REFUSED
 from tests.fault_campaign.draw import Drawn, draw
 from tests.faults.faulty import Seen, bench_with, press
 from tests.faults.test_kinds import LOST_AT_MOST_s
@@ -30,6 +30,7 @@ ALSO = {
     "derating": "stands still|its zero has moved since|travel limit",
     "force_drift": "was not reached|contact after only",
     "force_frozen": "the motor pushes with",
+    "force_hum": "contact after only",
     "foreign_commands": "already touches something",
     "frames_glued": "the motor reports a fault: force limit",
     "lost_position": "contact after only",
@@ -37,6 +38,15 @@ ALSO = {
     "stall": "stands still",
 }
 """What a fault is known to lead to at other instants, or with other protocols, than those of the table's rows."""
+
+LINE = r"no answer|no reply|checksum|CRC|silent|answers, but"
+OF_FAMILY = {
+    "Bytes on the wire": LINE,
+    "Frames": LINE,
+    "The port": LINE,
+    "What a device makes of a request": f"{LINE}|travel limit|depth limit",
+}
+"""And what any fault of a family may lead to, whatever the device."""
 
 
 @dataclass
@@ -119,6 +129,7 @@ def named(seen: Seen) -> list[str]:
         return [f"stopped although nothing had struck: {seen.cause}"]
     told = [r.says for name in struck for r in KINDS[name].reactions if r.says]
     told += [ALSO[name] for name in struck if name in ALSO]
+    told += [says for family, says in OF_FAMILY.items() if struck & {kind.name for kind in FAMILIES[family]}]
     if not any(re.search(says, seen.cause) for says in told):
         return [f"the cause names none of {', '.join(sorted(struck))}: {seen.cause}"]
     return []
