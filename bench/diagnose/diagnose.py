@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bench import identify
 from bench.errors import InputError
+from bench.identify.motion import holds
 from bench.recording.types import Measurement
 from sim.model import Model
 from sim.pad import Pad
@@ -40,6 +41,7 @@ LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and 
 # held out
 HARM = 1.2  # times the square of the error of what comes later: a cause that makes more of it is none
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
+SETTLED_S = 0.15  # after a move
 RIVALS = 4  # models of the best single causes that are kept
 
 
@@ -231,9 +233,12 @@ def _concluded(
 
 
 def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:
-    """What swings in what is left, whatever the motion does."""
-    at = prepared.at[prepared.raw.weight[prepared.at] > 0]
-    return swinging(prepared.full.time_s[at], residual_N[at], prepared.sample_s)
+    """What swings in what is left of the holds, where the motion has no part in it."""
+    full, still = prepared.full, np.zeros(prepared.full.size, dtype=bool)
+    for s in holds(full.time_s, full.position_mm):
+        still[s.start : s.stop] = full.time_s[s] > full.time_s[s.start] + SETTLED_S
+    at = prepared.at[(full.weight[prepared.at] > 0) & still[prepared.at]]
+    return swinging(full.time_s[at], residual_N[at], prepared.sample_s)
 
 
 def _apart(

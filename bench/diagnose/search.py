@@ -35,6 +35,7 @@ LATER = 12.0  # Δχ² by which a later form of a family must be better than its
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 MOST_CAUSES = 3
+MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
 
 
 @dataclass(frozen=True)
@@ -262,7 +263,8 @@ class Search:
             path.rivals.append(ranked)
             path.evidence.append(found)
             gained = now.chi2 - best.fit.chi2
-            if found.pays and not recurved and len(path.fits) > 1:
+            more = found.pays or now.chi2 > MISFIT * self.expected
+            if more and not recurved and len(path.fits) > 1:
                 recurved, other = True, self.recurved(now)
                 if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but one found of another shape
                     path.fits[-1] = other
