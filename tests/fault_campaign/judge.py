@@ -28,12 +28,16 @@ BLIND = (
 
 ALSO = {
     "derating": "stands still|its zero has moved since|travel limit",
-    "force_drift": "was not reached|contact after only",
+    "force_drift": "was not reached|contact after only|as the motor was energised",
     "force_frozen": "the motor pushes with",
-    "force_hum": "contact after only",
+    "force_hum": "contact after only|surface could not be measured",
     "foreign_commands": "already touches something",
     "frames_glued": "the motor reports a fault: force limit",
-    "lost_position": "contact after only",
+    "gain_drift": "tension limit|force limit",
+    "jam": "was not reached",
+    "knock": "as the motor was energised",
+    "lost_position": "contact after only|depth limit",
+    "position_drift": "moves by itself|contact after only|depth limit|travel limit|following error",
     "position_jump": "the motor reports a fault before any motion: force limit",
     "stall": "stands still",
 }
@@ -41,10 +45,10 @@ ALSO = {
 
 LINE = r"no answer|no reply|checksum|CRC|silent|answers, but"
 OF_FAMILY = {
-    "Bytes on the wire": LINE,
+    "Bytes on the wire": f"{LINE}|following error|surface could not be measured",
     "Frames": LINE,
     "The port": LINE,
-    "What a device makes of a request": f"{LINE}|travel limit|depth limit",
+    "What a device makes of a request": f"{LINE}|travel limit|depth limit|its zero has moved|where it was sent",
 }
 """And what any fault of a family may lead to, whatever the device."""
 
@@ -149,7 +153,11 @@ def kept(seen: Seen) -> list[str]:
     if seen.outcome is None or full:
         until_s = min([*full, *([seen.witness.killed_s] if seen.witness.killed_s is not None else [])])
         stamps = recording.load_cell.received_s
-        silent = any(strike.time_s < until_s and strike.device == "load_cell" for strike in seen.struck)
+        # nothing came, or the host took nothing, or its stamps are of another clock
+        silent = any(
+            strike.time_s < until_s and (strike.device == "load_cell" or strike.kind in ("host_stall", "clock_step"))
+            for strike in seen.struck
+        )
         if until_s > 1.0 and not silent and (stamps.size == 0 or stamps[-1] < until_s - LOST_AT_MOST_s):
             return ["what was flushed is not in the recording"]
         return []
