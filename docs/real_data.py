@@ -162,10 +162,12 @@ the `PROVENANCE.md` beside it.
 How to read the tables: *error* is the RMS of the simulated force against the measured one, over the whole file, from
 measured motion alone. *Noise of its holds* is what such an error would be with nothing left to explain: the scatter
 about smooth curves through the holds, with the position's noise carried through the stiffness. *Held-out error* is the
-same RMS for time blocks that the fit did not see. *Not told*: parameters whose standard error exceeds half of their
-value, or that ended at the edge of what the data can show. In the pictures measured is grey, simulated red.
+same RMS for time blocks that the fit did not see. *Not told*: what the fit calls `undetermined` ([fit.md](fit.md)): a
+standard error above 0.6 of the value, or above the value at another place that explains the data as well, or the edge
+of what the data can show. In the pictures measured is grey, simulated red.
 
-The model is one elastic response and one linear relaxation, from rest. On measured pads its error is a few times the
+The model is one elastic response and one linear relaxation, from rest (or, where a file begins with a force on the pad,
+from a state that is fitted). On measured pads its error is a few times the
 noise, seldom one: what is left is said below each table, from simple regressions of the residual on motion, depth and
 time. That is a description, not a diagnosis.
 """

@@ -9,11 +9,10 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-from bench.errors import InputError
 from bench.recording.types import Measurement
 
-from . import notes
-from .laws import Family, exponential, polynomial, power
+from . import asked, notes
+from .laws import Family
 from .noise import Noise, noise_of
 from .parameters import model_dict, parameters
 from .past import with_pasts
@@ -29,9 +28,7 @@ from .uncertainty import spread_of
 from .unformed import with_points
 
 LAWS = ("exponential", "power", "polynomial", "spline")
-ORDERS = (1, 2, 3, 4)
 DEGREES = (2, 3, 4)  # tried where the degree of a polynomial is not given
-MOST_ORDERS = 8
 
 
 def fit(
@@ -44,11 +41,10 @@ def fit(
 ) -> FitResult:
     """Fit one pad to all measurements, each from rest unless it begins loaded; raises InputError as `identify.fit`."""
     begun = time.perf_counter()
-    families = _families(law, degree)
-    orders = _orders(order)
-    contacts = {"auto": (True, False), "unilateral": (True,), "bonded": (False,)}.get(contact)
-    if contacts is None:
-        raise InputError("--contact", f"there is no contact `{contact}`", "One of: auto, bonded, unilateral.")
+    families = asked.families(law, degree, LAWS, DEGREES)
+    orders = asked.orders(order)
+    asked.contact_known(contact)
+    contacts = {"auto": (True, False), "unilateral": (True,), "bonded": (False,)}[contact]
     problem = build(measurements, between=True, blocks=True)
     noise = noise_of(problem.measurements)
     problem, choice = _chosen(problem, noise, families, orders, contacts, progress)
@@ -118,34 +114,6 @@ def _chosen(
     given: Sequence[Family] = families or points(problem, contacts[0])
     choice = choose(problem, [with_surfaces(f, problem) for f in given], orders, contacts, said)
     return problem, choice
-
-
-def _families(law: str, degree: int | None) -> list[Family]:
-    if law not in (*LAWS, "auto"):
-        raise InputError("--law", f"there is no law `{law}` here", f"One of: {', '.join((*LAWS, 'auto'))}.")
-    if degree is not None and not 1 <= degree <= 8:
-        raise InputError("--degree", f"{degree} is no degree of a polynomial to fit", "From 1 to 8.")
-    if degree is not None and law not in ("polynomial", "auto"):
-        raise InputError("--degree", f"the {law} law has no degree", "Use it with `--law polynomial`.")
-    several = [polynomial(n) for n in ((degree,) if degree else DEGREES)]
-    if law == "polynomial":
-        return several
-    named = {"exponential": [exponential()], "power": [power()]}
-    if law == "spline":
-        return []  # its depths come from the data
-    return named[law] if law != "auto" else [exponential(), power(), *several]
-
-
-def _orders(order: int | str) -> tuple[int, ...]:
-    if order == "auto":
-        return ORDERS
-    try:
-        r = int(order)
-    except ValueError:
-        r = 0
-    if not 1 <= r <= MOST_ORDERS:
-        raise InputError("--order", f"`{order}` is no order", f"`auto`, or a whole number from 1 to {MOST_ORDERS}.")
-    return (r,)
 
 
 def _evidence(choice: Choice, unit: float, within: float) -> list[Evidence]:

@@ -10,18 +10,21 @@ from .estimate import Estimate, polish
 from .problem import Problem
 
 BLOCKS, FOLDS = 20, 5
+JITTER = 2e-3  # of the greatest depth: a shorter way from sample to sample is no travel
 
 
 def folds_of(problem: Problem) -> list[NDArray[np.intp]]:
     """Of each run, the fold of every sample: contiguous blocks dealt out in turn.
 
     A block is a twentieth of the data, half by samples and half by travel: else one block would hold a whole fast
-    ramp, and with it all that is known of the elastic response.
+    ramp, and with it all that is known of the elastic response. Travel is that from one sample that counts to the
+    next, however many nodes without force lie between them.
     """
     steps = []
     for run in problem.runs:
-        travel = np.abs(np.diff(run.u, prepend=run.u[0]))
-        travel[travel < 2e-3] = 0.0  # jitter is no travel
+        travel, counted = np.zeros(run.size), np.flatnonzero(run.weight > 0)
+        way_of_each = np.abs(np.diff(run.u[counted], prepend=run.u[counted[:1]]))
+        travel[counted] = np.where(way_of_each < JITTER, 0.0, way_of_each)
         steps.append((run.weight, travel))
     weight = sum(float(w.sum()) for w, _ in steps)
     way = sum(float(t.sum()) for _, t in steps) or 1.0

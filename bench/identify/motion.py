@@ -15,6 +15,7 @@ from ._kernel import Array
 MIN_HOLD = 8  # samples
 LONG = 600_000  # samples of a channel beyond which a run is worked on in blocks and at a glance
 WINDOWS = 100_000  # that noise is judged on
+ENOUGH = 1000  # samples that tell the level of a hold
 
 
 def glanced(m: Measurement) -> Measurement:
@@ -65,6 +66,11 @@ def _stretches(position: Array, tolerance: float, least: int) -> NDArray[np.int6
     return found[:count]
 
 
+def _level(position: Array) -> float:
+    """Median; of a long stretch, of some thousand of its samples: a hold of minutes is put together from hundreds."""
+    return float(np.median(position[:: max(1, len(position) // ENOUGH)]))
+
+
 def holds(time_s: Array, position: Array) -> list[slice]:
     """Stretches where the position stays put: at least eight samples within its noise, and no trend.
 
@@ -85,9 +91,24 @@ def holds(time_s: Array, position: Array) -> list[slice]:
         if (
             out
             and out[-1].stop >= start - 1
-            and abs(np.median(position[out[-1]]) - np.median(position[start:stop])) < tolerance
+            and abs(_level(position[out[-1]]) - _level(position[start:stop])) < tolerance
         ):
             out[-1] = slice(out[-1].start, int(stop))
         else:
             out.append(slice(int(start), int(stop)))
     return out
+
+
+def turns(position: Array, least: float) -> list[int]:
+    """First, last and turning samples; wiggles below `least` (> 0, in the unit of the position) are none."""
+    out, best, way = [0], 0, 0
+    for k in range(1, len(position)):
+        if way == 0:
+            if abs(position[k] - position[0]) >= least:
+                way, best = (1 if position[k] > position[0] else -1), k
+        elif way * (position[k] - position[best]) > 0:
+            best = k
+        elif way * (position[best] - position[k]) >= least:
+            out.append(best)
+            way, best = -way, k
+    return [*out, len(position) - 1]

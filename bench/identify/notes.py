@@ -12,13 +12,17 @@ from bench.recording.types import Measurement
 from ._kernel import Array
 from .clocks import clocks_note
 from .estimate import NOTHING, Estimate
-from .motion import glanced, holds
+from .motion import glanced, holds, turns
 from .noise import Noise
 from .past import begins_loaded
 from .problem import Problem
 from .surface import moved_mm
 
 LAW, SHARES, RATES = "law", "shares", "rates"
+EVERYTHING = frozenset({LAW, SHARES, RATES})
+OF = {"c": {SHARES}, "nu": {RATES}, "a": {RATES}, "b": {SHARES, RATES}}
+"""Kinds of numbered parameters by their letter: c_i, nu_i, and a_i, b_i of a digital filter (13), whose poles are the
+rates alone. All others, the law's own b among them, are the law's."""
 
 
 @dataclass
@@ -30,13 +34,12 @@ class Findings:
 
     def lost(self, names: Collection[str]) -> set[str]:
         """Those of a fit's numbers that are spoilt."""
-        kinds = {name: {"c": SHARES, "nu": RATES}.get(name.partition("_")[0], LAW) for name in names}
-        return {name for name, kind in kinds.items() if kind in self.spoilt}
+        return {name for name in names if _kinds(name) & self.spoilt}
 
 
-def about_data(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = True) -> list[str]:
-    """The notes of `findings`."""
-    return findings(problem, noise, unilateral, pasts).notes
+def _kinds(name: str) -> set[str]:
+    letter, _, number = name.partition("_")
+    return OF.get(letter, {LAW}) if number else {LAW}
 
 
 def findings(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = True) -> Findings:
@@ -80,6 +83,7 @@ def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findi
         out.append(
             "The force is negative at depth: its sign is reversed (load cell `sign: -1`), or this is no pad pressed in."
         )
+        every.spoilt |= EVERYTHING
     elif top < 10 * noise.force_N:
         out.append(f"The force ({top:.3g} N at most) is less than ten times its noise: no number is told well.")
     level = _cap(force)
@@ -88,7 +92,7 @@ def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findi
             f"The force stands at {level:.4g} N again and again, with nothing above: the channel is saturated there."
             " This costs the law at depth and all shares and rates: the cut-off peaks look like a pad that gives way."
         )
-        every.spoilt |= {LAW, SHARES, RATES}
+        every.spoilt |= EVERYTHING
     stuck = _stuck(force, depth, noise, level)
     if stuck:
         out.append(
@@ -100,6 +104,8 @@ def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findi
         every.spoilt |= {LAW, RATES}
     loaded = begins_loaded(m, float(depth.max()), top, noise)
     out += _level_notes(m, depth, noise, top, unilateral, loaded, pasts)
+    if loaded and not pasts:
+        every.spoilt |= EVERYTHING
     if not loaded and deepest.any() and float(depth.max()) > 0:
         rising = np.flatnonzero(np.abs(force - _first_level(force, depth)) > max(8 * noise.force_N, 0.01 * top))
         start = depth[rising[0]] / depth.max() if len(rising) else 0.0
@@ -189,8 +195,8 @@ def _move_speeds(m: Measurement, depth_mm: float) -> Array:
         if b - a < 1:
             continue
         x, t = m.position_mm[a : b + 1], m.position_time_s[a : b + 1]
-        turns = _turns(x, 0.1 * depth_mm)
-        for i, j in zip(turns[:-1], turns[1:], strict=True):
+        ends = turns(x, 0.1 * depth_mm)
+        for i, j in zip(ends[:-1], ends[1:], strict=True):
             if abs(x[j] - x[i]) >= 0.1 * depth_mm and t[j] > t[i]:
                 # Middle half of the way: ends are acceleration, or a hold's first samples.
                 low, high = sorted((x[i] + 0.25 * (x[j] - x[i]), x[i] + 0.75 * (x[j] - x[i])))
@@ -199,21 +205,6 @@ def _move_speeds(m: Measurement, depth_mm: float) -> Array:
                 if t[q] > t[p]:
                     out.append(abs(x[q] - x[p]) / (t[q] - t[p]))
     return np.array(out)
-
-
-def _turns(x: Array, least: float) -> list[int]:
-    """First, last and turning samples, small wiggles left out."""
-    out, best, way = [0], 0, 0
-    for k in range(len(x)):
-        if way == 0 and abs(x[k] - x[0]) >= least:
-            way, best = (1 if x[k] > x[0] else -1), k
-        elif way and way * (x[k] - x[best]) > 0:
-            best = k
-        elif way and way * (x[best] - x[k]) >= least:
-            out.append(best)
-            way, best = -way, k
-    out.append(len(x) - 1)
-    return out
 
 
 def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
@@ -234,7 +225,7 @@ def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
     fast = [1 / nu for nu, a in zip(rates, weights[1:], strict=True) if a > 0 and 1 / nu < 3 * step]
     if fast:
         out.append(f"The fastest mode ({min(fast):.2g} s) is hardly longer than a sample ({step:.2g} s).")
-    if problem.rebuilt:
+    if problem.moves_rebuilt:
         out.append(
             "Fast moves were rebuilt between the samples: straight lines, as `simulate` has them, explain the force"
             " less well."

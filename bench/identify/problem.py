@@ -16,6 +16,7 @@ from sim.pad import union
 from ._kernel import Array
 from .long import is_long, shortened
 from .motion import LONG, jitter
+from .returns import with_returns
 from .runs import Run
 
 __all__ = ["Problem", "Run", "build"]
@@ -39,7 +40,9 @@ class Problem:
     noise_square: float = 0.0
     """Variance of the force's noise, scaled; the prior was weighed by it."""
     rebuilt: bool = False
-    """Whether there are nodes between samples (`bench.motion_between`)."""
+    """Whether there are nodes between samples (`bench.motion_between`, `returns`)."""
+    moves_rebuilt: bool = False
+    """Whether some of them stand in moves."""
 
     @property
     def weight(self) -> float:
@@ -103,20 +106,23 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
         raise InputError(names, "the force is zero throughout", "Is the force channel connected, its column right?")
     runs: list[Run] = []
     where: list[NDArray[np.intp]] = []
-    more = 0
+    in_moves = in_all = 0
     for k, m in enumerate(checked):
         if blocks and is_long(m):
             if between and len(m.position_time_s) <= LONG:  # many forces to few positions
                 time, position = motion_between(m.position_time_s, m.position_mm, noise_mm=jitter(m.position_mm))
-                more += len(time) - len(m.position_time_s)
+                in_moves += len(time) - len(m.position_time_s)
                 checked[k] = m = replace(m, position_time_s=time, position_mm=position)
             run, at = shortened(m, depth, force), np.zeros(0, dtype=np.intp)
         else:
             run, at, nodes = _run(m, depth, force, between)
-            more += nodes
+            in_moves, in_all = in_moves + nodes[0], in_all + nodes[1]
         runs.append(run)
         where.append(at)
-    return Problem(tuple(runs), depth, force, tuple(checked), tuple(where), tuple(notes), rebuilt=more > 0)
+    return Problem(
+        tuple(runs), depth, force, tuple(checked), tuple(where), tuple(notes),
+        rebuilt=in_moves + in_all > 0, moves_rebuilt=in_moves > 0,
+    )  # fmt: skip
 
 
 def _counted(m: Measurement) -> NDArray[np.bool_]:
@@ -156,10 +162,16 @@ def _checked(m: Measurement, notes: list[str]) -> Measurement:
     return m
 
 
-def _run(m: Measurement, depth_mm: float, force_N: float, between: bool) -> tuple[Run, NDArray[np.intp], int]:
+def _run(
+    m: Measurement, depth_mm: float, force_N: float, between: bool
+) -> tuple[Run, NDArray[np.intp], tuple[int, int]]:
+    """The run, where its forces stand, and how many nodes there are beyond the samples: in moves, in all."""
     motion_s, motion_mm = m.position_time_s, m.position_mm
+    in_moves = 0
     if between:
         motion_s, motion_mm = motion_between(motion_s, motion_mm, noise_mm=jitter(motion_mm))
+        in_moves = len(motion_s) - len(m.position_time_s)
+        motion_s, motion_mm = with_returns(m, motion_s, motion_mm)
     if np.array_equal(motion_s, m.force_time_s):
         time, position = motion_s, motion_mm
         at = np.arange(len(time))
@@ -170,4 +182,4 @@ def _run(m: Measurement, depth_mm: float, force_N: float, between: bool) -> tupl
     y[at] = m.force_N / force_N
     weight[at[_counted(m)]] = 1.0
     run = Run(time, np.diff(time, prepend=time[0]), position / depth_mm, y, weight, stamp_std_s=m.stamp_std_s)
-    return run, at, len(motion_s) - len(m.position_time_s)
+    return run, at, (in_moves, len(motion_s) - len(m.position_time_s))

@@ -33,21 +33,30 @@ def not_told(problem: Problem, estimate: Estimate, relative_std: dict[str, float
     `relative_std`: of c_i, nu_i by name, nan where there is none; `independent`: how many samples the residual is
     worth. χ² counts those.
     """
+    found = doubts(problem, estimate, relative_std, independent, DOUBTFUL)
+    return {name for name, doubt in found.items() if doubt > DOUBTFUL}
+
+
+def doubts(
+    problem: Problem, estimate: Estimate, relative_std: dict[str, float], independent: float, enough: float = math.inf
+) -> dict[str, float]:
+    """Of c_i and nu_i, the largest relative standard error at any place that explains the data as well; none of a fit
+    without weak numbers. The search ends where all are above `enough`."""
     weak = [name for name, value in relative_std.items() if not value < CERTAIN]
+    out: dict[str, float] = {}
     if not weak:
-        return set()
+        return out
     short, _ = condensed(problem, SAMPLES)
     best = polish(short, estimate, tolerance=1e-8)
     unit = estimate.cost / max(independent, 1.0)  # of the cost, for one unit of χ²
-    out: set[str] = set()
     for name in weak:
         i = int(name.partition("_")[2])
         for factor in RATES if name.startswith("nu") else SHARES:
-            if len(out) == len(relative_std):
+            if sum(doubt > enough for doubt in out.values()) == len(relative_std):
                 return out
             for found in _moved(short, best, name, i, factor, unit):
-                errors = _relative(best, found, unit)
-                out |= {other for other, error in errors.items() if error > DOUBTFUL}
+                for other, error in _relative(best, found, unit).items():
+                    out[other] = max(out.get(other, 0.0), error)
     return out
 
 

@@ -15,13 +15,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bench.errors import InputError
 from bench.recording.types import Measurement
 
 from . import _recursive_kernel as kernel
-from . import notes, objective
+from . import asked, notes, objective
 from ._kernel import Array
-from .discrete.choice import families, orders
+from .discrete.choice import families
 from .estimate import Estimate
 from .laws import Family
 from .noise import noise_of
@@ -140,11 +139,10 @@ def fit(
 ) -> FitResult:
     """The recursion over recorded data, once, in order; each run from rest. V is (16) with the numbers it ends at."""
     begun = time.perf_counter()
-    if contact not in ("auto", "bonded", "unilateral"):
-        raise InputError("--contact", f"there is no contact `{contact}`", "One of: auto, bonded, unilateral.")
+    asked.contact_known(contact)
     problem = build(measurements)
     noise = noise_of(problem.measurements)
-    laws, several = families(law, degree), orders(order)
+    laws, several = families(law, degree), asked.orders(order)
     unilateral = contact == "unilateral" or (contact == "auto" and not _pulls(problem, noise.force_N))
     ended = []
     for family in laws:

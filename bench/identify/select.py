@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from . import objective
 from .condense import condensed
-from .estimate import Estimate, polish, search
+from .estimate import Estimate, over_the_edge, polish, search
 from .held_out import held_out_square
 from .laws import Family
 from .objective import Structure
@@ -103,6 +103,10 @@ def choose(
         finished.append(_finished(c, fine, short, owners if fine is problem else None, independent, scatter, rank))
     best = _pick(finished, exact)
     e = polish(problem, best.estimate)
+    near = polish(short, e)
+    beside = over_the_edge(short, near)
+    if beside is not near:
+        e = min(e, polish(problem, beside), key=lambda one: one.cost)
     ended = judged(replace(best, estimate=e, V=e.cost / problem.weight), independent)
     return Choice(ended, [ended if c is best else c for c in finished], independent)
 

@@ -34,7 +34,7 @@ def minimise(
 
     Converged: the step promised and made less than `tolerance` of the cost, or there is nothing left to gain. A
     variable at a bound that the gradient presses against is held there. Marquardt's scaling: the result does not
-    hang on the units of x.
+    hang on the units of x. Where sums of sensitivities overflow the search ends, not converged.
     """
     x = np.clip(x0, lower, upper)
     damping, grow = 1e-3, 2.0
@@ -42,6 +42,8 @@ def minimise(
     floor = 1e-30 * max(value, 1.0)
     idle = step = 0
     for step in range(1, max_steps + 1):
+        if not (np.isfinite(H).all() and np.isfinite(g).all()):  # a model that all but runs away: no step from here
+            return Solution(x, value, np.zeros_like(H), step, False)
         free = ~(((x <= lower) & (g < 0)) | ((x >= upper) & (g > 0)))
         scale = np.sqrt(np.maximum(np.diag(H), 1e-14 * np.max(np.diag(H)) + 1e-300))
         # What an undamped step could still gain, whatever the damping has grown to.

@@ -83,8 +83,7 @@ class Movable(Family):
         s, ds[:, :k] = law.shape(moved, theta[:k])
         if not slopes:
             return s, ds
-        above, below = law.shape(moved + STEP, theta[:k])[0], law.shape(moved - STEP, theta[:k])[0]
-        ds[:, k + surface] = (above - below) / (2 * STEP)
+        ds[:, k + surface] = (law.shape(moved + STEP, theta[:k])[0] - s) / STEP
         return s, ds
 
 

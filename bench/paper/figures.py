@@ -165,7 +165,8 @@ def _responses(settings: Settings, data: Data, name: str, title: str, fits: Sequ
         parts.legend(figure.axes[0], above=False)
 
     law = {"power": "(10)", "exponential": "(9)"}[fits[0].law]
-    caption = f"Draw 0, elastic law {law}, r = 1 to 4. V of the noise alone would be {settings.noise_V_N2:.4f} N²."
+    caption = (f"Draw 0, elastic law {law}, r = 1 to 4. V of the noise alone would be {settings.noise_V_N2:.4f} N². "
+               "What is far off the data is cut off.")  # fmt: skip
     return Picture(name, title, caption, render(name, title, parts.WIDE, 290.0 * 2, draw))
 
 

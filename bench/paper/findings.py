@@ -268,7 +268,10 @@ def _one_iteration(settings: Settings, draws: Sequence[Draw]) -> Finding:
 
 
 def _quiet(fits: Sequence[Fitted], method: str) -> str:
-    return ", ".join(f"{1e3 * f.V**0.5:.0f}" for f in fits if f.method == method)
+    """√V in mN of each r. An unstable filter of a pad that can let go ends in no force at all: so V is that of F."""
+    return ", ".join(
+        f"{1e3 * f.V**0.5:.0f}" + ("" if f.filter.stable else " (unstable)") for f in fits if f.method == method
+    )
 
 
 def _each(label: str, cases: Sequence[bool]) -> Rate:

@@ -92,10 +92,10 @@ def write_findings(
 
 
 def poles_text(poles: Sequence[Sequence[float]]) -> str:
-    """Poles as people write them; of a pair one is written with ±."""
+    """Poles as people write them; of a pair one is written with ±, but for two that are one but for rounding."""
     out = []
     for real, imaginary in poles:
-        if imaginary == 0:
+        if abs(imaginary) < 5e-5:
             out.append(f"{real:.4f}")
         elif imaginary > 0:
             out.append(f"{real:.4f} ± {imaginary:.4f}j")

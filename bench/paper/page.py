@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from bench.paper.figures import Picture
@@ -85,7 +86,7 @@ def _finding(finding: Finding) -> str:
     cases = [["criterion", rate.label, str(rate)] for rate, _ in finding.main]
     cases += [["beside it", rate.label, str(rate)] for rate in finding.more]
     body = f"<h2>{markup.text(finding.claim)} <small>({markup.text(finding.verdict)})</small></h2>\n"
-    body += f"<p>{markup.text(finding.where)}</p>\n{markup.bullets(finding.numbers)}"
+    body += f"<p>{markup.text(finding.where)}</p>\n{markup.bullets(_minus(line) for line in finding.numbers)}"
     body += markup.table(["", "of the cases", "share (95 % interval)"], cases)
     tone = TONES[finding.verdict]
     return f'<section class="verdict {tone}" id="{finding.name}">\n{body}\n</section>\n'
@@ -116,14 +117,19 @@ def _tables(lines: Sequence[Line]) -> str:
             stable = "stable" if line["stable"] else "unstable"
             cells.append([
                 f"{line['r']}, {line['source']}", _numbers(line["a"]), _numbers(line["b"]), _numbers(line["gamma"]),
-                digits(line["V_N2"]) if line["V_N2"] is not None else "–", poles_text(line["poles"]), stable,
-                "yes" if line["relaxation"] else f"no: {line['reason']}",
+                digits(line["V_N2"]) if line["V_N2"] is not None else "–", _minus(poles_text(line["poles"])), stable,
+                "yes" if line["relaxation"] else f"no: {_minus(line['reason'])}",
             ])  # fmt: skip
             styles.append("off" if line["source"] == "paper" else "")
-        head = ["r", "a", "b", "γ", "V / N²", "poles", "", "relaxation?"]
+        head = ["r", "a", "b", "γ₁, γ₂", "V / N²", "poles", "", "relaxation?"]
         body += f"<h3>{markup.text(TITLES[table])}</h3>\n" + markup.table(head, cells, numeric=(4,), styles=styles)
     return body
 
 
 def _numbers(values: Sequence[float]) -> str:
     return ", ".join(digits(value) for value in values)
+
+
+def _minus(words: str) -> str:
+    """With the sign that the other numbers have."""
+    return re.sub(r"(?<![\w.])-(?=\d)", "−", words)

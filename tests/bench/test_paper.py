@@ -10,9 +10,10 @@ from numpy.testing import assert_allclose
 from bench.cli import main
 from bench.errors import InputError
 from bench.paper.draws import FILE, kept, run
-from bench.paper.experiment import Fitted, measured, starts_of
+from bench.paper.experiment import Fitted, measured, starts_of, without_noise
 from bench.paper.figures import fast_enough, ramp_force
 from bench.paper.findings import Finding, best, findings, spread, table_spread
+from bench.paper.output import poles_text
 from bench.paper.rates import rate, wilson
 from bench.paper.settings import settings
 from sim.model import Model
@@ -49,6 +50,11 @@ def test_starts_of_one_draw_are_not_counted_as_independent() -> None:
     certain = rate("", [(10, 10)] * 20)
     assert certain.low == pytest.approx(wilson(1.0, 20)[0])
     assert (rate("", []).low, rate("", [(0, 0)]).high) == (0.0, 1.0)
+
+
+def test_poles_that_are_one_but_for_rounding_are_no_pair() -> None:
+    assert poles_text([[0.99, 0.0], [0.92, 3e-9], [0.92, -3e-9]]) == "0.9900, 0.9200, 0.9200"
+    assert poles_text([[0.5, 0.25], [0.5, -0.25], [-0.4, 0.0]]) == "0.5000 ± 0.2500j, -0.4000"
 
 
 def test_noise_has_the_stated_size_and_changes_with_the_draw() -> None:
@@ -186,3 +192,12 @@ def test_counts_are_checked(option: str, tmp_path: Path, capsys: pytest.CaptureF
     assert main(["paper", str(tmp_path / "x"), option, "0"]) == 2
     assert "0 is too few" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
+
+
+def test_an_unstable_filter_is_named_beside_its_error_and_signs_are_of_one_kind(out: Path) -> None:
+    page = (out / "index.html").read_text(encoding="utf-8")
+    quiet = next(line for line in page.splitlines() if "Without any noise" in line)
+    runaway = [f.order for f in without_noise(settings()) if not f.filter.stable]
+    assert quiet.count("(unstable)") == len(runaway)
+    tables = page[page.index('id="tables"') :]
+    assert not re.search(r">[^<]*(?<![\w.])-\d", tables[: tables.index("settings.yaml")])

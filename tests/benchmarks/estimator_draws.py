@@ -54,32 +54,37 @@ class Outcome:
     undetermined: bool = False
 
 
-def outcomes(setting: Setting, seed: int) -> list[Outcome]:
-    """One pad, drawn anew until it is one that the setting wants, and its fits."""
-    rng = np.random.default_rng([seed, int(setting.rate_hz), int(1e6 * setting.noise), setting.modes])
+def drawn(setting: Setting, rng: np.random.Generator) -> tuple[Pad, Motion, np.ndarray, float, np.ndarray]:
+    """A pad, drawn anew until it is one that the setting wants: (pad, motion, times (n,) in s, noise in N, ∂F/∂θ)."""
     for _ in range(1000):
-        drawn = draw.pad(rng, orders=(setting.modes,) if setting.modes else (1, 2, 3))
-        depth, std = drawn.depth_mm, setting.noise * drawn.force_N
+        found = draw.pad(rng, orders=(setting.modes,) if setting.modes else (1, 2, 3))
+        pad, depth, std = found.pad, found.depth_mm, setting.noise * found.force_N
         levels = (depth * np.array([0.25, 0.5, 0.75, 1.0, 0.5, 0.2])).tolist()
         motion = staircase([*levels, -0.5], 80.0, setting.hold_s, lead_s=0.5 + float(rng.uniform(0, 0.02)))
         t = np.arange(int(motion.duration_s * setting.rate_hz)) / setting.rate_hz
         few = t[::SCREEN]
-        rough = _bound(_sensitivities(drawn.pad, motion, few), White(std / math.sqrt(SCREEN)), few)
-        if setting.all_told and np.any(rough > 1.5 * TOLD * _values(drawn.pad)):
-            continue
-        J = _sensitivities(drawn.pad, motion, t)
-        if not setting.all_told or np.all(_bound(J, White(std), t) <= TOLD * _values(drawn.pad)):
-            break
-    else:
-        raise RuntimeError(f"no pad of a thousand is told as wanted: {setting}")
-    clean = simulate(drawn.pad, motion, t, STEP_S).force_N
+        if setting.all_told:
+            rough = bound_of(sensitivities(pad, motion, few), White(std / math.sqrt(SCREEN)), few)
+            if np.any(rough > 1.5 * TOLD * _values(pad)):
+                continue
+        J = sensitivities(pad, motion, t)
+        if not setting.all_told or np.all(bound_of(J, White(std), t) <= TOLD * _values(pad)):
+            return pad, motion, t, std, J
+    raise RuntimeError(f"no pad of a thousand is told as wanted: {setting}")
+
+
+def outcomes(setting: Setting, seed: int) -> list[Outcome]:
+    """One pad, and its fits."""
+    rng = np.random.default_rng([seed, int(setting.rate_hz), int(1e6 * setting.noise), setting.modes])
+    pad, motion, t, std, J = drawn(setting, rng)
+    clean = simulate(pad, motion, t, STEP_S).force_N
     out: list[Outcome] = []
     for colour_s in setting.colours_s:
         noise = Coloured(std, colour_s) if colour_s else White(std)
-        bound = _bound(J, noise, t)
+        bound = bound_of(J, noise, t)
         force = clean + noise.draw(t, rng)
         for path in setting.paths:
-            out += _fitted(setting, seed, drawn.pad, motion, t, force, clean, bound, colour_s, path)
+            out += _fitted(setting, seed, pad, motion, t, force, clean, bound, colour_s, path)
     return out
 
 
@@ -87,7 +92,7 @@ def _values(pad: Pad) -> np.ndarray:
     return np.abs(list(pad.parameters().values()))
 
 
-def _sensitivities(pad: Pad, motion: Motion, t: np.ndarray, relative_step: float = 3e-5) -> np.ndarray:
+def sensitivities(pad: Pad, motion: Motion, t: np.ndarray, relative_step: float = 3e-5) -> np.ndarray:
     """∂F/∂θ (n, P) as `tests.truth.crb` has it, on fewer nodes."""
     columns = []
     for name, value in pad.parameters().items():
@@ -99,7 +104,8 @@ def _sensitivities(pad: Pad, motion: Motion, t: np.ndarray, relative_step: float
     return np.stack(columns, axis=1)
 
 
-def _bound(J: np.ndarray, noise: White, t: np.ndarray) -> np.ndarray:
+def bound_of(J: np.ndarray, noise: White, t: np.ndarray) -> np.ndarray:
+    """Cramér and Rao's bound on each number, (P,), from ∂F/∂θ (n, P) at the times t (n,)."""
     white = noise.whiten(t, J)
     fisher = white.T @ white
     scale = np.sqrt(np.diag(fisher))

@@ -43,7 +43,7 @@ ALSO = {
 }
 """What a fault is known to lead to at other instants, or with other protocols, than those of the table's rows."""
 
-LINE = r"no answer|no reply|checksum|CRC|silent|answers, but"
+LINE = r"no answer|no reply|the reply carries|checksum|CRC|silent|answers, but"
 OF_FAMILY = {
     "Bytes on the wire": f"{LINE}|following error|surface could not be measured",
     "Frames": LINE,

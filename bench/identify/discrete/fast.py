@@ -39,7 +39,7 @@ from .iv import refined
 from .linear import arx
 from .phases import Ramp, ramps_of
 from .series import Data
-from .system import Structure
+from .system import SOFTEST, Structure
 
 MOST_LOSS = 0.05
 LEAST_READ = 0.2  # of the greatest depth: ramps that end above it say nothing of the rest
@@ -108,10 +108,15 @@ class Fast:
         every = [[r for r in ramps_of(m) if r.rising] for m in data.measurements]
         rested = [[r for r in ramps if r.recovered] for ramps in every]
         phase = _samples(data, structure, every if self.ramps == "all" else rested, self.ramps)
+        first = _static(structure, phase)[0].x
+        if first[0] <= SOFTEST:
+            raise InputError(
+                "--method fast", "the force does not rise on its ramps", "Is its sign right (load cell `sign`)?"
+            )
         noise = noise_of(data.on_grid()).force_N / data.force_N
         left = silent(data, structure, noise)
         # `start`: a refit on part of the data
-        filter = self._steady(data, structure, phase, left) if start is None else structure.filter(start)
+        filter = self._steady(data, structure, first, left) if start is None else structure.filter(start)
         phase, loss = self._quick(structure, phase, filter, data.T)
         fitted, variance = _static(structure, phase)
         gamma = fitted.x
@@ -147,9 +152,8 @@ class Fast:
             )
         return Found(V, v, 1, True, [(V, v)], notes=notes, figures=figures, gamma_covariance=covariance)
 
-    def _steady(self, data: Data, structure: Structure, phase: _Phase, left: list[np.ndarray]) -> Filter:
+    def _steady(self, data: Data, structure: Structure, gamma: Array, left: list[np.ndarray]) -> Filter:
         """The step response by which losses are judged: ARX's would be biased, so the instrumental variable's."""
-        gamma = _static(structure, phase)[0].x
         v = structure.joined(gamma, self._linear(data, structure, gamma, left))
         if not np.isfinite(relative_V(data, structure, v)):
             raise _runs_away(structure)

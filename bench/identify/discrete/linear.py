@@ -110,14 +110,19 @@ def iv_equations(run: Series, structure: Structure, v: Array) -> Equations | Non
 
 
 def output_error(data: Data, structure: Structure, v: Array) -> Array:
-    """v after one Gauss-Newton step on the simulated output error by gain, A and B, the law's shape held."""
+    """v after one Gauss-Newton step on the simulated output error by gain, A and B, the law's shape held.
+
+    v itself where the filter or its sensitivities run away."""
     free = np.r_[0, structure.nonlinear : structure.size]
     matrix, right = np.zeros((len(free), len(free))), np.zeros(len(free))
     for run in data.runs:
         out = simulate(run, structure, v, "all")
         J = out.jacobian[:, free]
-        matrix += J.T @ (J * run.weight[:, None])
-        right += J.T @ (run.weight * (run.y - out.force))
+        with np.errstate(over="ignore", invalid="ignore"):
+            matrix += J.T @ (J * run.weight[:, None])
+            right += J.T @ (run.weight * (run.y - out.force))
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        return v
     new = v.copy()
     new[free] += _scaled_solve(matrix, right)
     return new

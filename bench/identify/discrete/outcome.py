@@ -13,20 +13,20 @@ from bench.errors import InputError
 from bench.recording.types import Measurement
 from sim.transfer import NotARelaxation, relaxation_of
 
+from .. import asked
 from .._kernel import Array
 from ..held_out import FOLDS, folds_of
 from ..noise import noise_of
-from ..notes import about_data
+from ..notes import findings
 from ..parameters import DOUBTFUL
 from ..problem import Problem, Run
 from ..result import Evidence, FitResult, Parameter, Trace
+from ..select import RESOLVED
 from . import choice
 from .estimator import Estimator, Found, relative_V
 from .series import Data, sampled
 from .spread import covariance, independent, relaxation_jacobian
 from .system import SOFTEST, Structure, named, simulate, values
-
-RESOLVED = 1e-5  # of the largest force: no difference of errors below it means anything
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ def fit(
 ) -> FitResult:
     """Sample the data, try the laws and orders, choose by n_e ln V + P ln n_e, report. Raises InputError."""
     begun = time.perf_counter()
-    families, orders = choice.families(law, degree), choice.orders(order)
+    families, orders = choice.families(law, degree), asked.orders(order)
     data = sampled(measurements, sample_time)
     unilateral = choice.unilateral(data, contact)
     structures = [Structure(f, r, unilateral) for f in families for r in orders]
@@ -94,8 +94,9 @@ def _result(estimator: Estimator, data: Data, best: Candidate, candidates: list[
     V = found.V * unit
     noise = noise_of(data.on_grid())
     reading = _Reading(estimator, data, structure, found)
-    about = about_data(data.checked, noise_of(data.checked.measurements), structure.unilateral, pasts=False)
-    notes = [*about, *data.notes, f"Sampled every {data.T:.6g} s.", *reading.notes, *found.notes]
+    about = findings(data.checked, noise_of(data.checked.measurements), structure.unilateral, pasts=False)
+    lost = about.lost(reading.parameters) | set(reading.undetermined)
+    notes = [*about.notes, *data.notes, f"Sampled every {data.T:.6g} s.", *reading.notes, *found.notes]
     filter = structure.filter(found.v)
     history: dict[str, list[float]] = {"V": [V_n * unit for V_n, _ in found.history]}
     for _, v in found.history:
@@ -119,7 +120,7 @@ def _result(estimator: Estimator, data: Data, best: Candidate, candidates: list[
         fit_percent=100 * (1 - float(np.sqrt(V * data.weight)) / variation) if variation > 0 else 0.0,
         physical=reading.physical,
         converged=bool(found.converged),
-        undetermined=reading.undetermined,
+        undetermined=[name for name in reading.parameters if name in lost],
         held_out_rmse=_held_out(estimator, data, structure, found) * data.force_N,
         samples=int(data.weight),
         seconds=time.perf_counter() - begun,

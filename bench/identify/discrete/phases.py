@@ -9,7 +9,7 @@ import numpy as np
 from bench.recording.types import Measurement
 
 from .._kernel import Array
-from ..motion import holds
+from ..motion import holds, turns
 
 MEMORY = 0.035
 """A pad counts as recovered where what is left of its earlier creep is no more than this share of the ramp's own force.
@@ -85,21 +85,6 @@ def _found(m: Measurement) -> list[tuple[float, float]]:
     out = []
     for i, j in zip(edges[::2], edges[1::2], strict=True):
         if j > i:
-            turns = _turns(x[i : j + 1], 0.02 * float(np.ptp(x)))
-            out += [(float(t[i + p]), float(t[i + q])) for p, q in zip(turns[:-1], turns[1:], strict=True)]
+            ends = turns(x[i : j + 1], 0.02 * float(np.ptp(x)))
+            out += [(float(t[i + p]), float(t[i + q])) for p, q in zip(ends[:-1], ends[1:], strict=True)]
     return out
-
-
-def _turns(x: Array, least: float) -> list[int]:
-    """First, last and turning samples; wiggles below `least` are none."""
-    out, best, way = [0], 0, 0
-    for k in range(1, len(x)):
-        if way == 0:
-            if abs(x[k] - x[0]) >= least:
-                way, best = (1 if x[k] > x[0] else -1), k
-        elif way * (x[k] - x[best]) > 0:
-            best = k
-        elif way * (x[best] - x[k]) >= least:
-            out.append(best)
-            way, best = -way, k
-    return [*out, len(x) - 1]

@@ -9,6 +9,7 @@ import numpy as np
 from sim.transfer import zero_order_hold
 
 from .._kernel import Array
+from ..uncertainty import windowed
 from .estimator import Estimator, Found
 from .series import Data
 from .system import Structure, simulate
@@ -21,10 +22,13 @@ def covariance(data: Data, structure: Structure, estimator: Estimator, found: Fo
     by construction (ARX under output noise) is in no standard error. γ from data of its own (`fast`) is carried on.
 
     A surface that touch-off left in doubt adds (dv/ds)(dv/ds)ᵀ of its own variance: the schemes take it as certain,
-    and their numbers move with it.
+    and their numbers move with it. Of a filter that all but runs away, whose sensitivities overflow: NaN throughout.
     """
-    scores = estimator.scores(data, structure, found.v)
-    S = _windowed(scores, memory(data, structure, found.v))
+    with np.errstate(over="ignore", invalid="ignore"):
+        scores = estimator.scores(data, structure, found.v)
+        S = windowed(scores, memory(data, structure, found.v))
+    if not np.isfinite(S).all():
+        return np.full_like(S, np.nan)
     M = _slope(data, structure, estimator, found.v)
     g = structure.nonlinear
     if found.gamma_covariance is None:
@@ -125,14 +129,3 @@ def _inverse(M: Array) -> Array:
     columns[columns == 0] = 1.0
     scaled: Any = np.linalg.pinv(M / rows[:, None] / columns, rcond=1e-14)
     return np.asarray(scaled / columns[:, None] / rows)
-
-
-def _windowed(scores: list[Array], width: int) -> Array:
-    """Σ_kl w(k−l) g_k g_lᵀ with Bartlett's w, by sums over all windows of `width` samples."""
-    out = np.zeros((scores[0].shape[1],) * 2)
-    for g in scores:
-        padded = np.concatenate([np.zeros((width, g.shape[1])), g, np.zeros((width - 1, g.shape[1]))])
-        sums = np.cumsum(padded, axis=0)
-        windows = sums[width:] - sums[:-width]
-        out += windows.T @ windows / width
-    return out

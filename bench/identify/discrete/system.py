@@ -124,7 +124,7 @@ def cost(data: Data, structure: Structure, v: Array) -> float:
 
 
 def normal_equations(data: Data, structure: Structure, v: Array, derivatives: str) -> tuple[float, Array, Array]:
-    """Σ w e², Σ w e ∂F/∂v, Σ w ∂F/∂v ∂F/∂vᵀ."""
+    """Σ w e², Σ w e ∂F/∂v, Σ w ∂F/∂v ∂F/∂vᵀ; the sums may be infinite where the filter all but runs away."""
     P = structure.size if derivatives == "all" else structure.nonlinear
     total, gradient, matrix = 0.0, np.zeros(P), np.zeros((P, P))
     for run in data.runs:
@@ -133,8 +133,9 @@ def normal_equations(data: Data, structure: Structure, v: Array, derivatives: st
             return float("inf"), gradient, matrix
         error = run.weight * (run.y - out.force)
         total += float(np.dot(error, run.y - out.force))
-        gradient += out.jacobian.T @ error
-        matrix += out.jacobian.T @ (out.jacobian * run.weight[:, None])
+        with np.errstate(over="ignore", invalid="ignore"):
+            gradient += out.jacobian.T @ error
+            matrix += out.jacobian.T @ (out.jacobian * run.weight[:, None])
     return total, gradient, matrix
 
 

@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 from bench import cli
+from bench.errors import InputError
+from bench.identify import fit
 from bench.identify.clocks import clocks_note
 from bench.identify.noise import noise_of
-from bench.identify.notes import about_data
+from bench.identify.notes import findings
 from bench.identify.problem import build
 from bench.recording.types import Measurement
 from tests.truth import draw
@@ -168,7 +170,7 @@ def test_the_fit_says_what_is_wrong_and_what_it_costs(name, tmp_path, capsys):
 
 def of_data(made: Rows) -> list[str]:
     m = made.measurement()
-    return about_data(build([m]), noise_of([m]), unilateral=True)
+    return findings(build([m]), noise_of([m]), unilateral=True).notes
 
 
 @pytest.mark.parametrize("name", ["saturated", "one speed", "sign", "late", "early", "drifting", "repeats"])
@@ -211,10 +213,60 @@ def test_clocks_that_agree_are_not_doubted_on_any_pad_or_motion():
     assert looked >= 15  # a quarter of a second is seen on most; slow or holdless motion cannot show it
 
 
-def test_a_discrete_method_says_it_too(tmp_path, capsys):
-    csv = saturated(0).write(tmp_path / "x.csv")
-    assert cli.main(["fit", str(csv), "--method", "iterative", "--law", "exponential", "--order", "1"]) == 0
-    assert "the channel is saturated there" in capsys.readouterr().out
+def loaded(seed: int) -> Rows:
+    made = rows(seed)
+    return made.kept(made.time_s > 6.0)
+
+
+LAW, SHARES, RATES = ("m", "b"), ("c_1", "c_2"), ("nu_1", "nu_2")
+POLES, ZEROS = ("a_1", "a_2"), ("b_1", "b_2")  # of a filter that is no relaxation: rates; rates and shares
+# what happened; what is said of it; which numbers are then none of the pad's
+SPOILT = {
+    "saturated": (saturated, "the channel is saturated there", (*LAW, *SHARES, *RATES, *POLES, *ZEROS)),
+    "sign": (reversed_sign, "its sign is reversed", (*LAW, *SHARES, *RATES, *POLES, *ZEROS)),
+    "loaded": (loaded, "takes it as at rest: every number is off", (*LAW, *SHARES, *RATES, *POLES, *ZEROS)),
+    "late": (later(0.02), "The force comes 20 ms later than the motion", (*LAW, *RATES, *POLES, *ZEROS)),
+    "early": (later(-0.02), "The force comes 20 ms earlier than the motion", (*LAW, *RATES, *POLES, *ZEROS)),
+    "drifting": (drifting, "The clocks of force and position drift apart", (*LAW, *RATES, *POLES, *ZEROS)),
+    "shallow": (shallow, "the elastic law cannot be told", LAW),
+}
+
+
+@pytest.mark.parametrize("method", ["noniterative", "iterative", "fast", "iv", "recursive"])
+@pytest.mark.parametrize("name", SPOILT)
+def test_every_method_names_what_bad_data_cost_it_or_refuses_them(name, method):
+    made, said, lost = SPOILT[name]
+    try:
+        result = fit(made(0).measurement(), method=method, law="exponential", order=2)
+    except InputError as error:
+        # `fast` needs ramps that rise from rest, ARX a filter that stays finite: neither is a number that misleads
+        assert method in ("fast", "iterative") and error.cure
+        return
+    assert said in "\n".join(result.notes)
+    assert set(lost) & set(result.parameters) <= set(result.undetermined)
+    assert set(LAW) <= set(result.undetermined)
+
+
+@pytest.mark.parametrize("method", ["noniterative", "iterative", "fast", "iv", "recursive"])
+def test_good_data_cost_no_method_a_number(method):
+    m = rows(0, Way(-0.5).hold(1).to(2.4, 80).hold(6).to(1, 50).hold(4).to(-0.5, 50).hold(2).motion()).measurement()
+    assert fit(m, method=method, law="exponential", order=2).undetermined == []
+
+
+@pytest.mark.parametrize("name", ["saturated", "late"])
+def test_recordings_of_several_runs_lose_what_one_of_them_spoils(name):
+    made, _, lost = SPOILT[name]
+    several = [rows(1).measurement(), made(0).measurement()]
+    for method in ("continuous", "iv"):
+        result = fit(several, method=method, law="exponential", order=2)
+        assert set(lost) & set(result.parameters) <= set(result.undetermined)
+
+
+def test_fast_refuses_a_force_that_does_not_rise_with_the_reason():
+    way = Way(-0.5).hold(1).to(2.4, 80).hold(6).to(-0.5, 50).hold(2).motion()
+    made = rows(0, way)
+    with pytest.raises(InputError, match="does not rise on its ramps"):
+        fit(replace(made, force_N=-made.force_N).measurement(), method="fast", law="exponential", order=2)
 
 
 def test_methods_that_start_from_rest_say_so_of_loaded_data(tmp_path, capsys):

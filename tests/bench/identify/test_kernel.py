@@ -45,7 +45,7 @@ def test_normal_equations_do_not_depend_on_the_chunk(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("contact", ["bonded", "unilateral"])
 @pytest.mark.parametrize("law", ["exponential", "power", "polynomial"])
 def test_the_model_it_returns_simulates_what_it_fitted(law: str, contact: str) -> None:
-    data = measured(Pad(Power(1.7, 0.8), (0.3, 0.2), (5.0, 0.4), contact), noise_N=0.05)  # type: ignore[arg-type]
+    data = measured(Pad(Power(1.7, 0.8), (0.3, 0.2), (5.0, 0.4), contact), noise_N=0.001)  # type: ignore[arg-type]
     data.force_time_s, data.force_N = data.force_time_s[5:-5:2], data.force_N[5:-5:2]
     result = fit(data, law=law, order=2, contact=contact)
     simulated = result.model.simulate_at(data.position_time_s, data.position_mm, data.force_time_s)

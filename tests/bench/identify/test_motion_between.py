@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.identify import fit
+from bench.identify import continuous, fit, problem
 from bench.motion_between import motion_between
+from tests.truth import draw
 from tests.truth import motion as motions
 from tests.truth.dataset import make
 from tests.truth.draw import POLYURETHANE
@@ -103,3 +104,28 @@ def test_clean_data_on_straight_lines_keep_them() -> None:
     # The law bends within a straight line too, which the model leaves out: so nearly, not quite.
     assert result.rmse < 0.01 * float(np.max(F))
     assert result.parameters["b"].value == pytest.approx(0.69, rel=0.03)
+
+
+def test_of_the_two_paths_the_one_with_the_lower_cost_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By however little: else V would be above that of the true numbers where the two are close."""
+    data, options = [], []
+    for seed in range(12):
+        rng = np.random.default_rng([31, seed])
+        drawn = draw.pad(rng, orders=(1,))
+        levels = (drawn.depth_mm * np.array([0.25, 0.5, 0.75, 1.0, 0.5])).tolist()
+        motion = motions.staircase([*levels, -0.5], 80.0, 1.0, lead_s=float(rng.uniform(0.5, 0.51)))
+        made = make(drawn.pad, motion, 200.0, Noise(White(0.01 * drawn.force_N)), rng)
+        data.append(of_dataset(made))
+        polynomial = drawn.pad.law.name == "polynomial"
+        options.append({"law": drawn.pad.law.name, "order": 1, "degree": 3 if polynomial else None})
+
+    def squares() -> list[float]:
+        return [fit(m, contact=c, **o).V for m, o in zip(data, options, strict=True) for c in ("bonded", "unilateral")]
+
+    found = squares()
+    monkeypatch.setattr(continuous, "straightened", lambda plain, choice: False)
+    rebuilt = squares()
+    monkeypatch.setattr(continuous, "build", lambda m, between=False, blocks=False: problem.build(m, blocks=blocks))
+    straight = squares()
+    assert found == pytest.approx(np.minimum(rebuilt, straight), rel=1e-8)
+    assert 0 < np.sum(np.array(straight) < rebuilt) < len(found)  # neither path is always the better

@@ -12,6 +12,7 @@ from bench.identify.laws import exponential
 from bench.identify.motion import holds, jitter
 from bench.identify.noise import noise_of
 from bench.identify.objective import Structure
+from bench.identify.problem import Problem, Run
 from bench.identify.solver import minimise
 from bench.recording.types import Measurement
 from tests.truth.laws import Exponential
@@ -129,3 +130,32 @@ def test_progress_is_told() -> None:
     said: list[str] = []
     fit(measured(PAD, noise_N=0.05), order=1, progress=said.append)
     assert any("power" in line for line in said) and any("bonded" in line for line in said)
+
+
+def test_nodes_without_force_move_no_block() -> None:
+    """Nodes between samples cut a ramp to steps that are each no more than jitter."""
+    t = np.arange(200) * 0.1
+    u = np.interp(t, [0, 2, 2.5, 10, 10.5, 20], [0, 0, 1, 1, 0.2, 0.2])
+    plain = problem_of(t, u, np.ones(200))
+    fine = np.unique(np.concatenate([t, *(t[:-1] + k * 0.1 / 64 for k in range(1, 64))]))
+    at = np.searchsorted(fine, t)
+    weight = np.zeros(len(fine))
+    weight[at] = 1.0
+    rebuilt = problem_of(fine, np.interp(fine, t, u), weight)
+    np.testing.assert_array_equal(folds_of(rebuilt)[0][at], folds_of(plain)[0])
+    assert len(set(folds_of(plain)[0][20:26])) > 1  # the ramp of half a second is in more than one block
+
+
+def problem_of(t: np.ndarray, u: np.ndarray, weight: np.ndarray) -> Problem:
+    return Problem((Run(t, np.diff(t, prepend=t[0]), u, np.zeros(len(t)), weight),), 1.0, 1.0)
+
+
+def test_a_search_ends_where_sums_of_sensitivities_overflow() -> None:
+    """f = x²; beyond x = 1 the derivatives are said to be infinite."""
+
+    def normal(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        slope = np.inf if x[0] < 1 else 1.0
+        return float(x @ x), -x * slope, np.full((1, 1), slope)
+
+    s = minimise(normal, lambda x: float(x @ x), np.array([4.0]), np.array([-9.0]), np.array([9.0]))
+    assert not s.converged and s.x[0] < 1 and s.cost == pytest.approx(s.x[0] ** 2) and s.matrix[0, 0] == 0
