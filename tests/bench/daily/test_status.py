@@ -78,4 +78,3 @@ def test_whether_the_motor_is_energised(padbench, monkeypatch, name, on):
     assert worlds[0].plant.servo_on is on, "and it was left so"
     said = padbench("status", name)
     assert ("ENERGISED" if on else "not energised") in said.out
-
