@@ -71,6 +71,10 @@ class Motor(Protocol):
         """Write clamps and watchdog, read them back; returns what the device now holds, for the recording."""
         ...
 
+    def held(self) -> Steps[None]:
+        """Read back what `prepare` wrote once more; raises `ReadbackError` where the device has forgotten it."""
+        ...
+
     def energise(self) -> Steps[None]:
         """Clear transient faults, close the position loop at the present position, without moving."""
         ...

@@ -89,6 +89,7 @@ class Orca:
         self._mm_per_um = 1e-3 * direction
         self._N_per_mN = 1e-3 * direction
         self._commanding = False
+        self._written: dict[int, tuple[list[int], str]] = {}
         self._last: MotorSample | None = None
         self._length: Callable[[bytearray], int] = self._modbus.rtu_length(STREAM, STREAM_REPLY_SIZE, b"")
         self._timeout_s = STREAM_TURNAROUND_S + link.wire_s(STREAM_REPLY_SIZE)
@@ -144,6 +145,16 @@ class Orca:
         back = yield self._modbus.read_holding(address, len(words))
         if back != words:
             raise ReadbackError(self.name, f"{what}: wrote {words} to register {address}, the motor holds {back}")
+        self._written[address] = words, what
+
+    def held(self) -> Steps[None]:
+        """Clamps, watchdog and gains once more: a motor that has restarted holds none of them, and streams on."""
+        for address, (words, what) in self._written.items():
+            back = yield self._modbus.read_holding(address, len(words))
+            if back != words:
+                raise ReadbackError(
+                    self.name, f"the motor has restarted: {what} is {back} in register {address}, no longer {words}"
+                )
 
     # -- energising, homing, safe states -----------------------------------------------------------------------
 

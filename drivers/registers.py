@@ -11,7 +11,7 @@ from typing import Any, Literal
 from drivers.errors import DriverError, ReadbackError
 from drivers.modbus import ModbusClient
 from drivers.motor import MotorIdentity, MotorLimits, MotorSample, SafeState
-from drivers.regmap import MotorMap, WriteBlock
+from drivers.regmap import MotorMap, Value, WriteBlock
 from drivers.sequence import Sequencer, Signals, code_name, raw_number
 from drivers.values import encode
 from drivers.wire import Exchange, Link, Steps
@@ -43,6 +43,7 @@ class RegisterMotor:
             reply_delay_s=1e-3 * device.reply.delay_ms,
         )
         self._signals = Signals(name, device, self._modbus)
+        self._written: dict[str, tuple[Value, list[int]]] = {}
         self._sequencer = Sequencer(self._signals, device.faults)
         name_of_block = device.block_of(device.values["position"])
         assert name_of_block is not None
@@ -101,8 +102,19 @@ class RegisterMotor:
                     self.name, f"{clamp}: wrote {words} to register {value.address:#06x}, the device holds {back}"
                 )
             held[clamp] = wanted[clamp]
+            self._written[clamp] = value, words
         held["not_clamped"] = sorted(wanted.keys() - self.map.clamps.keys())
         return held
+
+    def held(self) -> Steps[None]:
+        """The clamps once more."""
+        for clamp, (value, words) in self._written.items():
+            back = yield self._modbus.read_registers(value.table, value.address, value.words)
+            if back != words:
+                raise ReadbackError(
+                    self.name,
+                    f"the device has restarted: {clamp} is {back} in register {value.address:#06x}, no longer {words}",
+                )
 
     def _encoded(self, what: str, counts: float, value_name: str) -> list[int]:
         value = self.map.values[value_name]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from bench.recording.schemas import HALT, MOVE
-from drivers.errors import DriverError
+from drivers.errors import DeviceTimeout, DriverError, ReadbackError
 from drivers.motor import Motor, MotorSample
 from drivers.registers import RegisterMotor
 from drivers.wire import Exchange, Pause, Steps
@@ -125,12 +125,13 @@ class Axis:
         self._item: Exchange[Any] | Pause | None = None
         self._pause_until_s = 0.0
         self._taken_s = 0.0
+        self._doubtful = self._checking = False
         self.failures: list[DriverError] = []
         self.told: list[tuple[float, str, dict[str, float]]] = []
         """Moves that a move motor has taken, and halts: time, name, numbers; for whoever records."""
         self._telling: tuple[float, dict[str, float]] | None = None
         self.refused: DriverError | None = None
-        """Why the motor did not take a move or a stop; the plan goes on without it, so the run must not."""
+        """Why the motor did not take a move or a stop, or no longer holds its clamps; the run must not go on so."""
 
     # -- what is commanded -------------------------------------------------------------------------------------
 
@@ -254,6 +255,7 @@ class Axis:
         """Feed and poll no more."""
         self.live = False
         self._steps = None
+        self._checking = False
         self._waiting.clear()
 
     # -- the bytes ---------------------------------------------------------------------------------------------
@@ -305,8 +307,13 @@ class Axis:
             exchange, target = waiting.popleft()
             if exchange.error is not None:
                 self.failures.append(exchange.error)
+                self._doubtful |= isinstance(exchange.error, DeviceTimeout)
                 continue
             sample = exchange.result()
+            if self._doubtful and self.live and self._steps is None:
+                # it answers again: has it been off, and lost its clamps?
+                self._doubtful, self._checking = False, True
+                self._begin(self.motor.held())
             found.append((sample, self.command(sample.time_s) if math.isnan(target) else target))
         return found
 
@@ -333,6 +340,9 @@ class Axis:
             self._telling = None
 
     def _begin(self, steps: Steps[Any]) -> None:
+        """Start a conversation; a check under way gives way to it, and is made later."""
+        if self._checking and self._steps is not None:
+            self._doubtful, self._checking = True, False
         self._steps = steps
         self._item = None
         self._advance(self.clock.now())
@@ -355,14 +365,20 @@ class Axis:
         except StopIteration:
             self._steps = None
             self._item = None
-            self._taken_s = now_s
-            self._note_taken(now_s)
+            if not self._checking:
+                self._taken_s = now_s
+                self._note_taken(now_s)
+            self._checking = False
             return
         except DriverError as failure:
             self._steps = None
             self._item = None
-            self._telling = None
-            self.refused = failure
+            if self._checking and not isinstance(failure, ReadbackError):
+                self._doubtful = True  # not answered; to be asked again
+            else:
+                self._telling = None
+                self.refused = failure
+            self._checking = False
             return
         self._item = item
         if isinstance(item, Pause):

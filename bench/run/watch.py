@@ -281,7 +281,7 @@ class JumpWatch:
         spread_N = max(min(side[-2] - side[0], side[-1] - side[1]) for side in (before, after))
         if abs(jump_N) <= self._most(before_N) or spread_N > SMOOTH * abs(jump_N):
             return None
-        repeats = any(len(set(side)) <= SIDE // 2 for side in (before, after))
+        repeats = all(len(set(side)) <= SIDE // 2 for side in (before, after))
         even = self._even(self._times_s[0], REPEATING_S if repeats else STANDS_S)
         if even == MOVED and (repeats or before_N <= self._most(before_N)):
             return None

@@ -140,6 +140,13 @@ KINDS: tuple[Kind, ...] = (
         (
             Reaction("motor", {**IN_HOLD}, STOPPED, "motor is silent"),
             Reaction("motor", {**IN_RAMP, "off_s": 0.03}, STOPPED, "motor|following error"),
+            Reaction(
+                "motor",
+                {"step": "tare", "after_s": 0.1, "off_s": 0.01},
+                STOPPED,
+                "the motor has restarted: (force limit|watchdog)",
+                why="it answers again at once, but holds neither clamp nor watchdog any more",
+            ),
             Reaction("motor", {**IN_HOLD, "comes_back": "baudrate"}, STOPPED, "motor is silent"),
             Reaction("motor", {**IN_HOLD, "off_s": 0.1, "comes_back": "direction"}, STOPPED, "motor|following error"),
             Reaction(

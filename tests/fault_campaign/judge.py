@@ -27,28 +27,30 @@ BLIND = (
 
 
 ALSO = {
-    "derating": "stands still|its zero has moved since|travel limit",
-    "force_drift": "was not reached|contact after only|as the motor was energised",
+    "derating": "stands still|does not end|its zero has moved since|travel limit",
+    "force_drift": "was not reached|contact after only|as the motor was energised|the cell drifts",
     "force_frozen": "the motor pushes with",
     "force_hum": "contact after only|surface could not be measured",
     "foreign_commands": "already touches something",
     "frames_glued": "the motor reports a fault: force limit",
-    "gain_drift": "tension limit|force limit",
-    "jam": "was not reached",
-    "knock": "as the motor was energised",
+    "force_noise": "as the motor was energised",
+    "gain_drift": "tension limit|force limit|contact after only",
+    "jam": "was not reached|does not end",
+    "knock": "as the motor was energised|contact after only",
     "lost_position": "contact after only|depth limit",
     "position_drift": "moves by itself|contact after only|depth limit|travel limit|following error",
+    "position_frozen": "contact after only",
     "position_jump": "the motor reports a fault before any motion: force limit",
-    "stall": "stands still",
+    "stall": "stands still|does not end",
 }
 """What a fault is known to lead to at other instants, or with other protocols, than those of the table's rows."""
 
 LINE = r"no answer|no reply|the reply carries|checksum|CRC|silent|answers, but"
 OF_FAMILY = {
-    "Bytes on the wire": f"{LINE}|following error|surface could not be measured",
+    "Bytes on the wire": f"{LINE}|following error|surface could not be measured|already touches something",
     "Frames": LINE,
     "The port": LINE,
-    "What a device makes of a request": f"{LINE}|travel limit|depth limit|its zero has moved|where it was sent",
+    "What a device makes of a request": f"{LINE}|(travel|depth|force) limit|its zero has moved|where it was sent",
 }
 """And what any fault of a family may lead to, whatever the device."""
 
