@@ -38,7 +38,7 @@ ALSO = {
     "jam": "was not reached|does not end|its zero has moved",
     "knock": "as the motor was energised|contact after only",
     "lost_position": "contact after only|depth limit",
-    "position_drift": "moves by itself|contact after only|depth limit|travel limit|following error",
+    "position_drift": "moves by itself|not steady in air|contact after only|depth limit|travel limit|following error",
     "position_frozen": "contact after only",
     "position_jump": "the motor reports a fault before any motion: force limit",
     "stall": "stands still|does not end",
