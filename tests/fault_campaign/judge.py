@@ -30,7 +30,7 @@ ALSO = {
     "derating": "stands still|does not end|its zero has moved since|travel limit",
     "force_drift": "was not reached|contact after only|as the motor was energised|the cell drifts",
     "force_frozen": "the motor pushes with",
-    "force_hum": "contact after only|surface could not be measured|its zero has moved",
+    "force_hum": "contact after only|surface could not be measured|its zero has moved|was not reached",
     "foreign_commands": "already touches something",
     "frames_glued": "the motor reports a fault: force limit",
     "force_noise": "as the motor was energised",
@@ -38,10 +38,11 @@ ALSO = {
     "jam": "was not reached|does not end|its zero has moved",
     "knock": "as the motor was energised|contact after only",
     "lost_position": "contact after only|depth limit",
+    "motor_fault": "does not come on|does not hold",
     "position_drift": "moves by itself|not steady in air|contact after only|depth limit|travel limit|following error",
     "position_frozen": "contact after only",
     "position_jump": "the motor reports a fault before any motion: force limit",
-    "stall": "stands still|does not end",
+    "stall": "stands still|does not end|was not reached",
 }
 """What a fault is known to lead to at other instants, or with other protocols, than those of the table's rows."""
 
