@@ -26,34 +26,25 @@ BLIND = (
 """Faults after which the cell says less than there is: travel and depth still hold, the force limit is deceived."""
 
 
-ALSO = {
-    "derating": "stands still|does not end|its zero has moved since|travel limit",
-    "force_drift": "was not reached|contact after only|as the motor was energised|the cell drifts",
-    "force_frozen": "the motor pushes with",
-    "force_hum": "contact after only|surface could not be measured|its zero has moved|was not reached",
-    "foreign_commands": "already touches something",
-    "frames_glued": "the motor reports a fault: force limit",
-    "force_noise": "as the motor was energised",
-    "gain_drift": "tension limit|force limit|contact after only",
-    "jam": "was not reached|does not end|its zero has moved",
-    "knock": "as the motor was energised|contact after only",
-    "lost_position": "contact after only|depth limit",
-    "motor_fault": "does not come on|does not hold",
-    "position_drift": "moves by itself|not steady in air|contact after only|depth limit|travel limit|following error",
-    "position_frozen": "contact after only",
-    "position_jump": "the motor reports a fault before any motion: force limit",
-    "stall": "stands still|does not end|was not reached",
-}
-"""What a fault is known to lead to at other instants, or with other protocols, than those of the table's rows."""
-
 LINE = r"no answer|no reply|the reply carries|checksum|CRC|silent|answers, but"
+TOUCH = (
+    "contact after only|surface could not be measured|already touches something|as the motor was energised"
+    "|not steady in air|its zero has moved|was not reached"
+)
+LIMITS = "(force|tension|travel|depth|speed) limit|following error"
 OF_FAMILY = {
-    "Bytes on the wire": f"{LINE}|following error|surface could not be measured|already touches something",
-    "Frames": LINE,
-    "The port": LINE,
-    "What a device makes of a request": f"{LINE}|(travel|depth|force) limit|its zero has moved|where it was sent",
+    "Bytes on the wire": f"{LINE}|{LIMITS}|{TOUCH}",
+    "Frames": f"{LINE}|the motor reports a fault: force limit",
+    "The port": f"{LINE}|{TOUCH}",
+    "What a device makes of a request": f"{LINE}|{LIMITS}|{TOUCH}|where it was sent",
+    "What the load cell says": f"{LIMITS}|{TOUCH}|the cell drifts|the motor pushes with",
+    "What gets into the load cell's signal": f"{LIMITS}|{TOUCH}",
+    "The motor and its position": (
+        f"{LIMITS}|{TOUCH}|stands still|moves by itself|where it was sent|does not (end|come on|hold)"
+        "|the motor reports a fault before any motion: force limit"
+    ),
 }
-"""And what any fault of a family may lead to, whatever the device."""
+"""What any fault of a family is known to lead to, at other instants or with other protocols than the table's rows."""
 
 
 @dataclass
@@ -135,7 +126,6 @@ def named(seen: Seen) -> list[str]:
     if not struck:
         return [f"stopped although nothing had struck: {seen.cause}"]
     told = [r.says for name in struck for r in KINDS[name].reactions if r.says]
-    told += [ALSO[name] for name in struck if name in ALSO]
     told += [says for family, says in OF_FAMILY.items() if struck & {kind.name for kind in FAMILIES[family]}]
     if not any(re.search(says, seen.cause) for says in told):
         return [f"the cause names none of {', '.join(sorted(struck))}: {seen.cause}"]
