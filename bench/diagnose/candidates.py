@@ -19,6 +19,7 @@ from sim.effects import all_effects
 from sim.effects.base import Effect, Form, Parameter
 from sim.elastic import NoPad
 
+from . import ripple
 from .data import Data
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, errors, extended, force_at, jacobian
@@ -28,13 +29,12 @@ Array = NDArray[np.float64]
 CHANNEL = ("outliers", "stuck_samples", "mains_hum")  # found by detectors, not by fitting
 MOST_STARTS = 96
 LOWEST_RINGING_HZ, FREQUENCIES = 4.0, 32
-PERIODS = 16
 SHORTEST = 0.12  # of the longest period
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich
-LONGEST_REPORTED = 0.6  # of the travel, for errors of the position: longer ones are another elastic law
+LONGEST_REPORTED = 0.6  # of the depth, for errors of the position: longer ones are another elastic law
 
 
 @dataclass(frozen=True)
@@ -61,12 +61,14 @@ class Reach:
 
 def narrowed(form: Form, reach: Reach) -> Form:
     """The form with its parameters kept within what the data can tell of, and started there."""
-    longest = LONGEST_REPORTED if "report" in form.blocks else LONGEST_PERIOD
-    longest = longest if reach.rich else LONGEST_IN_PASSING
-    return replace(form, parameters=tuple(_narrowed(p, reach, longest) for p in form.parameters))
+    way_mm, share = reach.travel_mm, LONGEST_PERIOD
+    if "report" in form.blocks and reach.depth_mm > 0.1 * reach.travel_mm:  # in air no force shows it
+        way_mm, share = reach.depth_mm, LONGEST_REPORTED
+    longest_mm = way_mm * (share if reach.rich else LONGEST_IN_PASSING)
+    return replace(form, parameters=tuple(_narrowed(p, reach, longest_mm) for p in form.parameters))
 
 
-def _narrowed(p: Parameter, reach: Reach, longest: float) -> Parameter:
+def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     lower, upper, starts, default = p.lower, p.upper, p.starts, p.if_left_out
     if p.unit == "1/s" and p.logarithmic:
         lower, upper = max(lower, 0.3 / reach.span_s), min(upper, 0.6 / reach.sample_s)
@@ -75,9 +77,8 @@ def _narrowed(p: Parameter, reach: Reach, longest: float) -> Parameter:
     elif p.unit == "s" and p.logarithmic:
         upper = min(upper, 3.0 * reach.span_s)
     elif p.name == "period":
-        shortest = SHORTEST * longest  # some levels of depth are met by any ripple that is short enough
-        lower, upper = max(lower, shortest * reach.travel_mm), min(upper, longest * reach.travel_mm)
-        starts = tuple((reach.travel_mm / np.linspace(1.04 / longest, 0.96 / shortest, PERIODS)).tolist())
+        # some levels of depth are met by any ripple that is short enough
+        lower, upper = max(lower, SHORTEST * longest_mm), min(upper, longest_mm)
     elif p.name == "reach":
         default = reach.depth_mm
     elif p.name == "at_depth":
@@ -172,17 +173,26 @@ class Signatures:
             column = column - float(np.sum(q * column)) * q
         return column
 
-    def of(self, cause: Cause) -> tuple[float, float]:
-        """(χ² that the cause's signature takes, amplitude at which it does); amplitude within the bounds."""
+    def column(self, cause: Cause) -> Array:
+        """Change of the force by a unit of the cause's amplitude (n,), whitened, beyond what the pad can imitate."""
         amplitude = cause.amplitude
         assert amplitude is not None
         size = 0.3 * (abs(amplitude.typical) or 1.0)
         if size > amplitude.upper:
             size = 0.5 * amplitude.upper
-        structure = self.fit.structure.with_cause(cause.with_start(**{amplitude.name: size}))
+        return self._clear(self.data.whitened(self._change(cause.with_start(**{amplitude.name: size}))) / size)
+
+    def _change(self, cause: Cause) -> Array:
+        """What a cause adds to the force (n,), N, all else as it is."""
+        structure = self.fit.structure.with_cause(cause)
         added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
-        x = extended(self.fit, added)
-        column = self._clear(self.data.whitened(force_at(self.data, structure, x) - self.force) / size)
+        with np.errstate(all="ignore"):
+            return force_at(self.data, structure, extended(self.fit, added)) - self.force
+
+    def of(self, cause: Cause) -> tuple[float, float]:
+        """(χ² that the cause's signature takes, amplitude at which it does); amplitude within the bounds."""
+        amplitude, column = cause.amplitude, self.column(cause)
+        assert amplitude is not None
         square = float(np.sum(column * column))
         if not np.isfinite(square) or square <= 1e-18:
             return 0.0, 0.0
@@ -193,10 +203,7 @@ class Signatures:
 
     def whole(self, cause: Cause) -> float:
         """χ² that a cause takes as it stands, the pad's numbers free to first order; −inf where it makes no plant."""
-        structure = self.fit.structure.with_cause(cause)
-        added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
-        with np.errstate(all="ignore"):
-            change = force_at(self.data, structure, extended(self.fit, added)) - self.force
+        change = self._change(cause)
         if not np.isfinite(change).all():
             return -np.inf
         column = self._clear(self.data.whitened(change))
@@ -238,6 +245,8 @@ def starts(signatures: Signatures, effect: Effect, form: Form, most: int = 2) ->
         if len(tried) > most:
             tried = sorted(tried, key=lambda c: -signatures.whole(c))
         return [Start(c, np.inf) for c in tried[:most]]
+    if ripple.ripples(form):
+        return _rippling(signatures, effect, cause, most)
     amplitude = cause.amplitude
     found: list[Start] = []
     every = list(combinations(form))
@@ -253,6 +262,22 @@ def starts(signatures: Signatures, effect: Effect, form: Form, most: int = 2) ->
                            promise))  # fmt: skip
     found.sort(key=lambda s: -s.promise)
     return found[:most]
+
+
+def _rippling(signatures: Signatures, effect: Effect, cause: Cause, most: int) -> list[Start]:
+    """Starts of what repeats with the position."""
+    sine, amplitude = cause_of(effect, effect.forms[0]), cause.amplitude
+    assert amplitude is not None
+
+    def column(period_mm: float, phase_rad: float) -> Array:
+        return signatures.column(sine.with_start(period=period_mm, phase=phase_rad))
+
+    out = []
+    for values, promise in ripple.starts(cause.form, column, signatures.residual, most):
+        size = min(max(values["amplitude"], 0.05 * amplitude.typical), 5 * amplitude.typical)
+        values["amplitude"] = _inside(size, amplitude.lower, amplitude.upper)
+        out.append(Start(cause.with_start(**values), promise))
+    return out
 
 
 def _inside(value: float, lower: float, upper: float) -> float:

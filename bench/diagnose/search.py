@@ -122,10 +122,25 @@ class Search:
             wide.sort(key=lambda trials: trials[0].score)
             self.progress(f"closer: {', '.join(trials[0].id for trials in wide[:THIRD])}")
             ended = list(pool.map(lambda trials: [self._carried(t, ALL) for t in _contenders(trials)], wide[:THIRD]))
+            best = min((t for trials in ended for t in trials), key=lambda t: t.score, default=None)
+            if best is not None:
+                again = pool.map(lambda trials: self._relaxing_as(best, min(trials, key=lambda t: t.score)), ended)
+                ended = [[*trials, *new] for trials, new in zip(ended, again, strict=True)]
         found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[THIRD:]]]
         found_all += [sieved[i][0] for i in order[SECOND:]]
         found_all.sort(key=lambda t: t.score)
         return sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score)
+
+    def _relaxing_as(self, best: Trial, trial: Trial) -> list[Trial]:
+        """A trial again, from where the pad relaxes as in the best one: modes settle in many ways, most of them bad."""
+        order = best.fit.structure.pad.pad.relaxation.order
+        if trial is best or order == 0:
+            return []
+        end = len(best.fit.structure.pad.coordinates)
+        x = trial.fit.x.copy()
+        x[end - 2 * order : end] = best.fit.x[end - 2 * order : end]
+        again = self._solved(trial.fit.structure, x, MORE, None)
+        return [self._carried(again, ALL)] if again is not None and again.score < trial.score else []
 
     def _late_alike(self, fit: Fit, ranked: list[Trial], family: dict[str, list[Form]]) -> list[Trial]:
         """Where a delay, a lag or a stiff resonance fits best: the others again, from where they are as late as it."""
