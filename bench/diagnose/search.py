@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +32,7 @@ WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
+CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 MOST_CAUSES = 3
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
@@ -114,8 +114,13 @@ class Search:
                 by_id.setdefault(pair[0].id, []).extend(found)
             promising = self._promising(by_id) if only is None else list(by_id)
             self.progress(f"{len(promising)} candidates")
+            believed = self._as_believed(fit)
             sieved = dict(
-                zip(promising, pool.map(lambda i: self._sieved(fit, by_id[i], signatures), promising), strict=True)
+                zip(
+                    promising,
+                    pool.map(lambda i: self._sieved(fit, by_id[i], signatures, believed), promising),
+                    strict=True,
+                )
             )
             order = sorted((i for i in promising if sieved[i]), key=lambda i: sieved[i][0].score)
             wide = list(pool.map(lambda i: self._widened(fit, sieved[i], family[i]), order[:SECOND]))
@@ -167,7 +172,9 @@ class Search:
         order = sorted((i for i in promise if promise[i] >= least), key=lambda i: -promise[i])
         return order[:WORTH]
 
-    def _sieved(self, fit: Fit, found: list[Start], signatures: Signatures) -> list[Trial]:
+    def _sieved(
+        self, fit: Fit, found: list[Start], signatures: Signatures, believed: tuple[Array, Array]
+    ) -> list[Trial]:
         """A few steps from the most promising starts of an id, and once more with the pad as it was believed."""
         found = sorted(found, key=lambda s: -s.promise)
         chosen = [s for s in found if np.isinf(s.promise)]
@@ -179,7 +186,7 @@ class Search:
                 chosen.append(s)
         joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen]
         tried = [t for t in joined if t is not None]
-        tried += self._from_believed(fit, tried)
+        tried += self._from_believed(tried, *believed)
         return sorted(tried, key=lambda t: t.score)
 
     def _widened(self, fit: Fit, trials: list[Trial], family: list[Form]) -> list[Trial]:
@@ -216,20 +223,20 @@ class Search:
                 best = t
         return best
 
-    def _from_believed(self, fit: Fit, tried: Sequence[Trial]) -> list[Trial]:
-        """The best of some starts again, with the pad as it was believed: a refit may have run far from it."""
-        if not tried or fit.structure.causes[len(self.believed.causes) :]:
-            return []
-        best = min(tried, key=lambda t: t.score)
-        structure = best.fit.structure
-        start = structure.x(self.believed.pad.x(), structure.values(best.fit.x))
-        again = self._solved(structure, start, FEW, self._believed_jacobian)
-        return [] if again is None else [again]
+    def _as_believed(self, fit: Fit) -> tuple[Array, Array]:
+        """(the pad's numbers as believed, derivatives there by them and by the causes of a fit)."""
+        pad = self.believed.pad.x()
+        x = fit.structure.x(pad, fit.structure.values(fit.x), fit.of_run)
+        return pad, jacobian(self.short, fit.structure, x)[:, : len(x) - fit.structure.tail]
 
-    @cached_property
-    def _believed_jacobian(self) -> Array:
-        x = self.believed.x(self.believed.pad.x())
-        return jacobian(self.short, self.believed, x)[:, : len(x) - self.believed.tail]
+    def _from_believed(self, tried: Sequence[Trial], pad: Array, known: Array) -> list[Trial]:
+        """The best of some starts again, with the pad as it was believed: a refit may have run far from it."""
+        if not tried:
+            return []
+        best = min(tried, key=lambda t: t.score).fit
+        start = best.structure.x(pad, best.structure.values(best.x), best.of_run)
+        again = self._solved(best.structure, start, FEW, known)
+        return [] if again is None else [again]
 
     def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
         structure = fit.structure.with_cause(cause)
@@ -285,12 +292,20 @@ class Search:
                     path.fits[-1] = other
                     del path.rivals[-1], path.evidence[-1]
                     continue
-            if not found.pays or now.chi2 - reshaped > SAME * gained:
+            if not found.pays or self._reshaped(now.chi2, best.fit.chi2, reshaped):
                 break
             path.fits.append(best.fit)
             if len(path.fits) > 2 and best.fit.chi2 > 1.05 * self.expected:
                 path.fits[-1] = self.exchanged(path)
         return path
+
+    def _reshaped(self, before: float, after: float, reshaped: float) -> bool:
+        """Whether another shape of a cause found does what a further cause did; not where that one leaves nothing, and
+        the other shape something. All are χ²."""
+        left = max(before - self.expected, 1e-9)
+        if after - self.expected < CLEAN * left and reshaped - self.expected > UNCLEAN * left:
+            return False
+        return before - reshaped > SAME * (before - after)
 
     def recurved(self, now: Fit) -> Fit:
         """The fit with one of its causes in another form, also of those that only refine others; if that is better."""
