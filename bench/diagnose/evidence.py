@@ -76,6 +76,20 @@ def penalty(free: int, effective: float) -> float:
     return free * float(np.log(effective))
 
 
+def unexplained(chi2: float, samples: float) -> float:
+    """χ² beyond what noise, and the doubt about its size, may leave."""
+    return max(chi2 - 1.02 * samples - 3.0 * float(np.sqrt(2.0 * samples)), 0.0)
+
+
+def tempered(effective: float, share: float, ratio: float) -> float:
+    """Evidence against a rival, with the doubt that a shape of its family not tried here would do better.
+
+    `share`: of the gain that it reaches; `ratio`: what it leaves more, over what the best itself leaves unexplained. A
+    rival that misses by less than the best itself does is hardly excluded, however significant the difference.
+    """
+    return min(effective, 1.5 + 250.0 * (1.0 - share), 6.0 * float(np.log1p(max(ratio, 0.0))))
+
+
 def believable(fit: Fit, prepared: Prepared) -> bool:
     """Whether the last cause's numbers are beyond what such data could show at all."""
     cause = fit.structure.causes[-1]

@@ -19,7 +19,7 @@ from sim.effects import Form
 
 from .candidates import CHANNEL, Reach, Signatures, Start, forms, is_rich, starts
 from .data import Prepared
-from .evidence import Evidence, believable, evidence_of, penalty
+from .evidence import Evidence, believable, evidence_of, penalty, unexplained
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, extended, force_at, jacobian, reduced, refit
@@ -32,6 +32,7 @@ WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
+ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexplained: so little more is none
 CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 MOST_CAUSES = 3
@@ -134,7 +135,21 @@ class Search:
         found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[THIRD:]]]
         found_all += [sieved[i][0] for i in order[SECOND:]]
         found_all.sort(key=lambda t: t.score)
-        return sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score)
+        return self._plainer(fit, sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score))
+
+    def _plainer(self, fit: Fit, ranked: list[Trial]) -> list[Trial]:
+        """First the one of fewest numbers, where what it leaves more is little beside what the best leaves too."""
+        if not ranked:
+            return ranked
+        best = ranked[0].fit
+        gained, beyond = fit.chi2 - best.chi2, unexplained(best.chi2, self.expected) + 1.0
+
+        def as_good(t: Trial) -> bool:
+            more = t.fit.chi2 - best.chi2
+            return t.fit.free < best.free and more < ALIKE * gained and more < ALIKE_LEFT * beyond
+
+        plain = min((t for t in ranked[1:] if as_good(t)), key=lambda t: t.fit.free, default=None)
+        return ranked if plain is None else [plain, *(t for t in ranked if t is not plain)]
 
     def _relaxing_as(self, best: Trial, trial: Trial) -> list[Trial]:
         """A trial again, from where the pad relaxes as in the best one: modes settle in many ways, most of them bad."""

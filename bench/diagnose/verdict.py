@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .data import Prepared
+from .evidence import tempered, unexplained
 from .held_out import held_out_square
 from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
@@ -105,25 +106,11 @@ def alternatives(
         effective = delta / scale + extra * np.log(search.effective)
         share = float(np.clip((without_chi2 - t.fit.chi2) / gained, 0.0, 1.0))
         excluded = bool(effective > RIVAL and share < 0.995)
-        ratio = float(delta) / (_unexplained(best, search.expected) + 1.0)
-        odds += float(np.exp(-0.5 * min(max(_tempered(effective, share, ratio), 0.0), 200.0)))
+        ratio = float(delta) / (unexplained(best, search.expected) + 1.0)
+        odds += float(np.exp(-0.5 * min(max(tempered(effective, share, ratio), 0.0), 200.0)))
         if not excluded or not out:
             out.append(Alternative(t.id, t.cause.form.name, share, float(delta), excluded))
     return out, 1.0 / (1.0 + odds)
-
-
-def _unexplained(chi2: float, samples: float) -> float:
-    """χ² beyond what noise, and the doubt about its size, may leave."""
-    return max(chi2 - 1.02 * samples - 3.0 * float(np.sqrt(2.0 * samples)), 0.0)
-
-
-def _tempered(effective: float, share: float, ratio: float) -> float:
-    """Evidence against a rival, with the doubt that a shape of its family not tried here would do better.
-
-    `share`: of the gain that it reaches; `ratio`: what it leaves more, over what the best itself leaves unexplained. A
-    rival that misses by less than the best itself does is hardly excluded, however significant the difference.
-    """
-    return min(effective, 1.5 + 250.0 * (1.0 - share), 6.0 * float(np.log1p(max(ratio, 0.0))))
 
 
 def described(fit: Fit, index: int) -> tuple[str, str, dict[str, Number]]:
