@@ -167,6 +167,7 @@ class Signatures:
         Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
         self.Q = [np.ascontiguousarray(q) for q in Q.T]
         self.residual = self._clear(data.whitened(data.force_N - self.force))
+        self.waves: dict[tuple[str, float, float], Array] = {}  # by effect, period and phase: its forms share them
 
     def _clear(self, column: Array) -> Array:
         for q in self.Q:
@@ -270,7 +271,10 @@ def _rippling(signatures: Signatures, effect: Effect, cause: Cause, most: int) -
     assert amplitude is not None
 
     def column(period_mm: float, phase_rad: float) -> Array:
-        return signatures.column(sine.with_start(period=period_mm, phase=phase_rad))
+        key = (effect.id, period_mm, phase_rad)
+        if key not in signatures.waves:
+            signatures.waves[key] = signatures.column(sine.with_start(period=period_mm, phase=phase_rad))
+        return signatures.waves[key]
 
     out = []
     for values, promise in ripple.starts(cause.form, column, signatures.residual, most):

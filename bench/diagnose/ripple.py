@@ -1,4 +1,4 @@
-"""Where to start what repeats with the position: every period, with the phases and harmonics that the residual asks for.
+"""Where to start what repeats with the position: every period, with the phases and harmonics that fit the residual.
 
 For a given period a sine and its second harmonic are linear in four numbers, so that only the period is scanned.
 """
@@ -15,7 +15,7 @@ from sim.effects.base import Form
 
 Array = NDArray[np.float64]
 
-PERIODS = 24
+PERIODS = 36
 RATIO = 2.5  # of the second harmonic to the first at the most, to start with
 
 
@@ -37,11 +37,10 @@ def starts(
     lowest, highest = 1.0 / period.upper, 1.0 / period.lower
     step = lowest / math.ceil(lowest * PERIODS / max(highest - lowest, 1e-9 * highest))
     waves = range(round(lowest / step), int(highest / step) + 1)
-    pairs = {k: [column(1.0 / (k * step), phase) for phase in (0.0, 0.5 * math.pi)] for k in waves}
+    every = {*waves, *(2 * k for k in waves if second)}
+    pairs = {k: [column(1.0 / (k * step), phase) for phase in (0.0, 0.5 * math.pi)] for k in every}
     found = []
     for k in waves:
-        if second and 2 * k not in pairs:
-            break
         columns = np.stack([*pairs[k], *(pairs[2 * k] if second else ())], axis=1)
         norm = np.linalg.norm(columns, axis=0)
         if not np.isfinite(norm).all() or norm.min() <= 1e-9:

@@ -1,0 +1,54 @@
+"""Where the search begins for what repeats with the position."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bench.diagnose import ripple
+from bench.diagnose.candidates import Reach, narrowed
+from sim.effects import effect
+
+DEPTH_mm = np.concatenate([np.linspace(0.0, 3.0, 400), np.linspace(3.0, 0.0, 200)])
+REACH = Reach(sample_s=0.005, span_s=60.0, travel_mm=3.0, depth_mm=3.0, force_N=5.0)
+
+
+def _wave(period_mm: float, phase_rad: float) -> np.ndarray:
+    return np.sin(2 * np.pi * DEPTH_mm / period_mm + phase_rad)
+
+
+@pytest.mark.parametrize("id_", ["cogging", "encoder_error"])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_ripple_begins_near_its_period_with_its_phases_and_harmonic(id_, seed):
+    """A sixth of a wave off over the whole travel at the most: at its ends the fundamental is then 30° off."""
+    rng = np.random.default_rng(seed)
+    amplitude, period = 0.5 * (1 + rng.random()), float(rng.uniform(0.5, 1.7))
+    phase, second = rng.uniform(-np.pi, np.pi, 2)
+    ratio = float(rng.uniform(0.2, 0.8))
+    felt = amplitude * (_wave(period, phase) + ratio * _wave(period / 2, second))
+    shape = narrowed(effect(id_).form("harmonics"), REACH)
+    found = list(ripple.starts(shape, _wave, felt, 2))
+    values, promise = found[0]
+    assert 0.8 * float(felt @ felt) < promise <= float(felt @ felt) * (1 + 1e-9)
+    assert abs(3.0 / values["period"] - 3.0 / period) < 0.2
+    near = values["amplitude"] * (
+        _wave(values["period"], values["phase"]) + values["ratio"] * _wave(values["period"] / 2, values["second_phase"])
+    )
+    assert np.mean((near - felt) ** 2) < 0.2 * np.mean(felt**2)
+
+
+def test_starts_are_apart_and_within_bounds():
+    rng = np.random.default_rng(7)
+    shape = narrowed(effect("encoder_error").form("sine"), REACH)
+    bounds = next(p for p in shape.parameters if p.name == "period")
+    found = list(ripple.starts(shape, _wave, rng.standard_normal(DEPTH_mm.size), 3))
+    periods = [values["period"] for values, _ in found]
+    assert len(set(periods)) == 3 and all(bounds.lower < p < bounds.upper for p in periods)
+    assert [promise for _, promise in found] == sorted((promise for _, promise in found), reverse=True)
+
+
+def test_an_error_of_the_position_repeats_within_the_depth():
+    """In air no force shows it, however far the axis travels there."""
+    far = Reach(sample_s=0.005, span_s=60.0, travel_mm=9.0, depth_mm=3.0, force_N=5.0)
+    longest = next(p for p in narrowed(effect("encoder_error").forms[0], far).parameters if p.name == "period").upper
+    assert longest < 3.0
