@@ -17,6 +17,7 @@ from sim.pad import union
 
 from .hum import Line, find
 from .noise import Colour, ForceNoise, force_noise, hold_errors
+from .whiten import Whitening, whitening
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -45,6 +46,9 @@ class Data:
     """Number of the hold, the move or the window, from 0 on."""
     tared: Mask | None = None
     """Entries at which the force was taken for zero (the tare); None: the force's zero is its own."""
+    colour: Colour = Colour()
+    """Of the noise, from force sample to force sample, which are `sample_s` apart."""
+    sample_s: float = 1.0
 
     @property
     def size(self) -> int:
@@ -62,11 +66,18 @@ class Data:
         return np.asarray(np.sqrt(self.weight) / self.sigma_N)
 
     @cached_property
+    def _filter(self) -> Whitening | None:
+        return whitening(self.colour, self.time_s, self.weight, self.sample_s)
+
+    def _uncoloured(self, e: Array) -> Array:
+        return e if self._filter is None else self._filter(e)
+
+    @cached_property
     def _modes(self) -> tuple[NDArray[np.intp], Array, Array] | None:
         """(stretch, u (n,), factor · u (n,)): in each stretch (1 + u uᵀ)^−½ = 1 − factor u uᵀ; None: nothing to do."""
         if self.shared_N is None or self.stretch is None:
             return None
-        u = self.scale * self.shared_N
+        u = self._uncoloured(self.scale * self.shared_N)
         squares = np.bincount(self.stretch, u * u)
         if not (squares > LEAST_SHARED).any():
             return None
@@ -75,7 +86,7 @@ class Data:
 
     def whitened(self, force_N: Array) -> Array:
         """Forces (n,) in units of noise that is independent from entry to entry: what a stretch shares counts once."""
-        e = self.scale * force_N
+        e = self._uncoloured(self.scale * force_N)
         if self._modes is None:
             return np.asarray(e)
         stretch, u, factor = self._modes
@@ -181,7 +192,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     depth = max(float(position.max()), 1e-3)
     full = Data(
         grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))), shared, stretch,
-        _tared(m, grid),
+        _tared(m, grid), noise.colour, sample_s,
     )  # fmt: skip
     owner = _blocks(
         full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(motion.std_mm, 0.9))
@@ -300,4 +311,5 @@ def _averaged(full: Data, owner: NDArray[np.intp]) -> Data:
         time, position, force, weight, sigma, full.fold[starts], shared,
         None if full.stretch is None else full.stretch[starts],
         tared if tared is not None and tared.any() else None,
+        full.colour, full.sample_s,
     )  # fmt: skip

@@ -195,7 +195,7 @@ def _concluded(
     least = min(TOLD * scale, SPEAKS * floor**2)
     causes += [replace(c, gain=c.gain / scale) for c in channel if c.gain > least or by_themselves(c)]
     left = excess[-1] / scale if causes and np.isfinite(scale) else 1.0 - sum(c.gain for c in causes)
-    tests = remains(full, residual, prepared.colour, whole[1].free, swing)
+    tests = remains(full, residual, whole[1].free, swing)
     told = [r for r in tests if r.passed]
     if causes:
         verdict = "explained" if explains(left, causes) else "unexplained"

@@ -29,15 +29,6 @@ class Colour:
     share: float = 0.0
     phi: float = 0.0
 
-    def inflation(self, direction: Array) -> float:
-        """How many times the variance of Σ d e exceeds that of white noise, d (n,); at least a little above 0."""
-        d = np.asarray(direction, dtype=np.float64)
-        square = float(np.sum(d * d))
-        if square == 0.0 or self.share <= 0.0 or self.phi <= 0.0:
-            return 1.0
-        carried = lfilter([0.0, self.phi], [1.0, -self.phi], d)  # Σ_{j<i} φ^{i−j} d_j
-        return max(1.0 + 2.0 * self.share * float(np.sum(d * carried)) / square, 0.2)
-
     @property
     def memory(self) -> float:
         """Samples that say the same as one, of a slow direction: 1 + 2 Σ ρ."""

@@ -9,7 +9,6 @@ from scipy.stats import chi2 as chi2_law
 from bench.identify.motion import holds
 
 from .data import Data
-from .noise import Colour
 from .result import Remainder
 from .swing import Swing
 
@@ -29,7 +28,7 @@ SENTENCES = {
 }
 
 
-def remains(data: Data, residual_N: Array, colour: Colour, spent: int, swing: Swing | None) -> list[Remainder]:
+def remains(data: Data, residual_N: Array, spent: int, swing: Swing | None) -> list[Remainder]:
     """The tests, most telling first. `residual_N` (n,) on the data's grid; `spent`: numbers fitted."""
     use = np.flatnonzero(data.weight > 0)
     if len(use) < 60:
@@ -40,10 +39,10 @@ def remains(data: Data, residual_N: Array, colour: Colour, spent: int, swing: Sw
     out = []
     total = float(e @ e)
     for name, number in groups.items():
-        value, count, found = _grouped(e, number, colour)
+        value, count, found = _grouped(e, number)
         p = float(chi2_law.sf(value, max(count, 1)))
         out.append(_remainder(name, p, found / total, made))
-    value, found = _memory(e, colour, spent)
+    value, found = _memory(e, spent)
     out.append(_remainder("memory", float(chi2_law.sf(value, 1)), found, made))
     if swing is not None:
         out.append(Remainder("swing", 0.0, swing.share, SENTENCES["swing"].format(frequency=swing.frequency_Hz), True))
@@ -54,7 +53,7 @@ def _remainder(name: str, p: float, share: float, made: int) -> Remainder:
     return Remainder(name, p, share, SENTENCES[name], p * made < LEVEL and share > CRUMB)
 
 
-def _grouped(e: Array, number: NDArray[np.intp], colour: Colour) -> tuple[float, int, float]:
+def _grouped(e: Array, number: NDArray[np.intp]) -> tuple[float, int, float]:
     """(χ² of the group means, groups, what they take of Σ e² beyond chance)."""
     value = taken = 0.0
     count = 0
@@ -63,22 +62,19 @@ def _grouped(e: Array, number: NDArray[np.intp], colour: Colour) -> tuple[float,
         n = int(inside.sum())
         if n < 8:
             continue
-        direction = inside.astype(np.float64)
-        inflation = colour.inflation(direction)
         part = float(e[inside].sum()) ** 2 / n
-        value += part / inflation
-        taken += max(part - inflation, 0.0)
+        value += part
+        taken += max(part - 1.0, 0.0)
         count += 1
     return value, count, taken
 
 
-def _memory(e: Array, colour: Colour, spent: int) -> tuple[float, float]:
+def _memory(e: Array, spent: int) -> tuple[float, float]:
     """Power beyond the noise's own: (its standing as a χ² of one degree, share)."""
     n = len(e)
     excess = float(e @ e) / max(n - spent, 1) - 1.0
-    # the variance of a mean square of coloured noise, and of the noise's own estimate, which was no better
-    power = colour.share**2 * colour.phi**2 / (1.0 - colour.phi**2) if colour.phi < 1 else 0.0
-    spread = np.sqrt(2.0 / n * (1.0 + 2.0 * power)) * np.sqrt(3.0) + 0.06
+    # the scatter of a mean square, and of the noise's own estimate, which was no better
+    spread = np.sqrt(6.0 / n) + 0.06
     return float(max(excess / spread, 0.0) ** 2), max(excess, 0.0) / (1.0 + max(excess, 0.0))
 
 

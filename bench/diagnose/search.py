@@ -74,8 +74,8 @@ class Search:
         self.believed = structure
         self.samples = float(prepared.full.weight.sum())
         # what noise alone leaves of χ² on the stand-in, whose entries are means
-        self.expected = float(np.count_nonzero(self.short.weight > 0)) * float(np.sqrt(prepared.colour.memory))
-        self.effective = max(self.samples / prepared.colour.memory, 20.0)
+        self.expected = float(np.count_nonzero(self.short.weight > 0))
+        self.effective = max(self.samples, 20.0)
         full = prepared.full
         self.reach = Reach(
             sample_s=prepared.sample_s,
@@ -183,7 +183,7 @@ class Search:
         """Ids whose first-order signature takes anything worth while, and those that have none."""
         promise = {id_: max((s.promise for s in found), default=0.0) for id_, found in by_id.items()}
         finite = [p for p in promise.values() if np.isfinite(p)]
-        least = max(0.01 * max(finite, default=0.0), 8.0 * self.prepared.colour.memory)
+        least = max(0.01 * max(finite, default=0.0), 8.0)
         order = sorted((i for i in promise if promise[i] >= least), key=lambda i: -promise[i])
         return order[:WORTH]
 
@@ -234,7 +234,7 @@ class Search:
         best = trials[0]
         for t in trials[1:]:
             fewer = t.fit.free < best.fit.free
-            if fewer and t.fit.chi2 - best.fit.chi2 < PLAIN * self.prepared.colour.memory:
+            if fewer and t.fit.chi2 - best.fit.chi2 < PLAIN:
                 best = t
         return best
 
@@ -269,12 +269,12 @@ class Search:
         at = fit.structure.of_cause(len(fit.structure.causes) - 1)
         x, lower, upper = fit.x[at], fit.structure.lower[at], fit.structure.upper[at]
         edge = float(np.sum((x <= lower + 1e-9) | (x >= upper - 1e-9)))  # a shape at its bound is another one's limit
-        unusual = 0.0 if cause.form.name == cause.effect.forms[0].name else LATER * self.prepared.colour.memory
-        unusual += edge * LATER * self.prepared.colour.memory
+        unusual = 0.0 if cause.form.name == cause.effect.forms[0].name else LATER
+        unusual += edge * LATER
         return Trial(cause, fit, fit.chi2 + self._penalty(fit) + unusual)
 
     def _penalty(self, fit: Fit) -> float:
-        return penalty(fit.free, self.effective) * self.prepared.colour.memory
+        return penalty(fit.free, self.effective)
 
     def _carried(self, trial: Trial, steps: int) -> Trial:
         return self._trial(refit(self.short, trial.fit.structure, trial.fit.x, steps, 1e-8))
@@ -351,11 +351,7 @@ class Search:
 
     def judge(self, before: Fit, after: Fit, base: Fit) -> Evidence:
         """Whether the step from one fit to the next is more than chance, and more than a crumb."""
-        short = self.short
-        change = force_at(short, after.structure, after.x) - force_at(short, before.structure, before.x)
-        direction = self.prepared.full.whitened(change[self.prepared.owner])
-        inflation = self.prepared.colour.inflation(direction)
-        return evidence_of(before, after, base, inflation, self.samples, self.expected)
+        return evidence_of(before, after, base, self.samples, self.expected)
 
     def exchanged(self, path: Path) -> Fit:
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it."""

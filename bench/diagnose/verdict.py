@@ -93,10 +93,9 @@ def alternatives(
     search: Search, fit: Fit, without_chi2: float, rivals: Sequence[Trial]
 ) -> tuple[list[Alternative], float]:
     """(those that the data cannot exclude, and the strongest rival; confidence in the name)."""
-    colour = search.prepared.colour
     best = fit.chi2
     # what the family's shape leaves counts as noise when names are compared: no shape is exact
-    scale = max(best / max(search.expected, 1.0), 1.0) * np.sqrt(colour.memory)
+    scale = max(best / max(search.expected, 1.0), 1.0)
     gained = max(without_chi2 - best, 1e-12)
     out: list[Alternative] = []
     odds = 0.0
