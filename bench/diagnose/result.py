@@ -64,6 +64,9 @@ class CauseFound:
     alternatives: list[Alternative]
     explanation: str
     check: str = ""
+    of_its_kind: float = 0.0
+    """Confidence that it is this one or another of its kind, where that is more: a force that comes late is late by a
+    delay, a lag or a stiff resonance."""
 
     def to_json(self) -> dict[str, Any]:
         """The entry of diagnosis.json."""

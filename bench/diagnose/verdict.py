@@ -10,6 +10,7 @@ import numpy as np
 from .data import Prepared
 from .evidence import tempered, unexplained
 from .held_out import held_out_square
+from .late import LATE
 from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
 from .search import Path, Search, Trial
@@ -74,7 +75,7 @@ def _square_std(prepared: Prepared, fit: Fit) -> float:
 
 def explains(left: float, causes: Sequence[CauseFound]) -> bool:
     """Whether causes explain an error of which a share is left: they may leave less, the less sure they are."""
-    sure = min((c.confidence for c in causes), default=1.0)
+    sure = min((max(c.confidence, c.of_its_kind) for c in causes), default=1.0)
     return left <= EXPLAINED * sure * (0.5 if len(causes) >= MANY else 1.0)
 
 
@@ -91,14 +92,15 @@ def stage_of(path: Path, id_: str) -> tuple[Trial | None, list[Trial], float]:
 
 def alternatives(
     search: Search, fit: Fit, without_chi2: float, rivals: Sequence[Trial]
-) -> tuple[list[Alternative], float]:
-    """(those that the data cannot exclude, and the strongest rival; confidence in the name)."""
+) -> tuple[list[Alternative], float, float]:
+    """(those that the data cannot exclude, and the strongest rival; confidence in the name, and in its kind)."""
     best = fit.chi2
     # what the family's shape leaves counts as noise when names are compared: no shape is exact
     scale = max(best / max(search.expected, 1.0), 1.0)
     gained = max(without_chi2 - best, 1e-12)
     out: list[Alternative] = []
-    odds = 0.0
+    odds, of_others = 0.0, 0.0
+    late = fit.structure.causes[-1].id in LATE
     for t in rivals:
         delta = t.fit.chi2 - best
         extra = t.fit.free - fit.free
@@ -106,10 +108,12 @@ def alternatives(
         share = float(np.clip((without_chi2 - t.fit.chi2) / gained, 0.0, 1.0))
         excluded = bool(effective > RIVAL and share < 0.995)
         ratio = float(delta) / (unexplained(best, search.expected) + 1.0)
-        odds += float(np.exp(-0.5 * min(max(tempered(effective, share, ratio), 0.0), 200.0)))
+        likely = float(np.exp(-0.5 * min(max(tempered(effective, share, ratio), 0.0), 200.0)))
+        odds += likely
+        of_others += 0.0 if late and t.id in LATE else likely
         if not excluded or not out:
             out.append(Alternative(t.id, t.cause.form.name, share, float(delta), excluded))
-    return out, 1.0 / (1.0 + odds)
+    return out, 1.0 / (1.0 + odds), 1.0 / (1.0 + of_others)
 
 
 def described(fit: Fit, index: int) -> tuple[str, str, dict[str, Number]]:
@@ -139,11 +143,13 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
     out = []
     for k, gain in enumerate(gains):
         own_trial, rivals, before = stage_of(path, final.structure.causes[own + k].id)
-        others, confidence = alternatives(search, own_trial.fit, before, rivals) if own_trial else ([], 0.5)
+        others, confidence, kind = alternatives(search, own_trial.fit, before, rivals) if own_trial else ([], 0.5, 0.5)
         id_, form, numbers = described(final, own + k)
         effect = final.structure.causes[own + k].effect
         values = {name: number.value for name, number in numbers.items()}
-        out.append(CauseFound(id_, form, numbers, gain, confidence, others, explain(effect, values), effect.check))
+        out.append(
+            CauseFound(id_, form, numbers, gain, confidence, others, explain(effect, values), effect.check, kind)
+        )
     return out
 
 
