@@ -47,7 +47,7 @@ class Data:
     tared: Mask | None = None
     """Entries at which the force was taken for zero (the tare); None: the force's zero is its own."""
     colour: Colour = Colour()
-    """Of the noise, from force sample to force sample, which are `sample_s` apart."""
+    """Of the noise, from force sample to force sample, which are `sample_s` apart, as far as the cost knows of it."""
     sample_s: float = 1.0
 
     @property
@@ -138,6 +138,18 @@ class Prepared:
         return self.noise.colour
 
     @property
+    def memory(self) -> float:
+        """Samples that say the same as one, and that χ² does not know of."""
+        return 1.0 if self.full.colour == self.colour else self.colour.memory
+
+    def white(self) -> Prepared:
+        """With a cost that knows the noise's colour. It is for fits that leave little beside the noise: it makes much
+        of what changes fast, and so of what a model that is far off leaves there.
+        """
+        colour = self.colour
+        return replace(self, full=replace(self.full, colour=colour), short=replace(self.short, colour=colour))
+
+    @property
     def floor_N(self) -> float:
         """RMS of an error with nothing left to explain."""
         w = self.full.weight
@@ -192,7 +204,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     depth = max(float(position.max()), 1e-3)
     full = Data(
         grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))), shared, stretch,
-        _tared(m, grid), noise.colour, sample_s,
+        _tared(m, grid), Colour(), sample_s,
     )  # fmt: skip
     owner = _blocks(
         full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(motion.std_mm, 0.9))

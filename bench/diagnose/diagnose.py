@@ -61,6 +61,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     base = search.base(_pads(m, believed, structure, flags.good))
     tell("looking for causes")
     path = search.path(base)
+    prepared = search.prepared
     prepared, flags, search, path = _asked_again(m, prepared, flags, search, path)
     base, final = path.fits[0], path.fits[-1]
     final = ordered(prepared, final, base)
@@ -169,7 +170,8 @@ def _asked_again(
     if outlier.sum() == flags.outlier.sum() and np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
     flags = not_of_the_motion(m, replace(flags, outlier=outlier))
-    prepared = prepare(m, flags.good)
+    anew = prepare(m, flags.good)
+    prepared = anew.white() if prepared.memory == 1.0 else anew
     again = Search(prepared, search.believed, search.progress, search.known)
     path = replace(path, fits=[onto(f, prepared.short, 15, 1e-8) for f in path.fits])
     return prepared, flags, again, path

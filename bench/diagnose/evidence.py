@@ -20,9 +20,10 @@ SHARE = 0.008  # of what all causes take together: what a further cause must tak
 
 @dataclass(frozen=True)
 class Evidence:
-    """A step from one fit to the next."""
+    """A step from one fit to the next: Δχ², and what the noise's colour leaves of it."""
 
     delta_chi2: float
+    effective: float
     freedom: int
     threshold: float
     share: float
@@ -36,7 +37,7 @@ class Evidence:
     @property
     def significant(self) -> bool:
         """More than chance."""
-        return self.delta_chi2 > self.threshold
+        return self.effective > self.threshold
 
     @property
     def pays(self) -> bool:
@@ -51,14 +52,16 @@ def threshold(freedom: int) -> float:
     return float(chi2_law.isf(LEVEL / TRIED, max(freedom, 1)))
 
 
-def evidence_of(before: Fit, after: Fit, base: Fit, samples: float, expected: float) -> Evidence:
-    """What the step from `before` to `after` is worth; `expected`: χ² that noise alone leaves."""
+def evidence_of(before: Fit, after: Fit, base: Fit, memory: float, samples: float, expected: float) -> Evidence:
+    """What the step from `before` to `after` is worth; `memory`: samples that say the same as one, which χ² does not
+    know of; `expected`: χ² that noise alone leaves."""
     delta = before.chi2 - after.chi2
     freedom = max(after.free - before.free, 1)
     excess = max(base.chi2 - expected, 1e-9)
     left = max(before.chi2 - expected, delta, 1e-9)
     return Evidence(
         delta_chi2=delta,
+        effective=delta / memory,
         freedom=freedom,
         threshold=threshold(freedom),
         share=delta / max(excess, delta),

@@ -18,11 +18,11 @@ from sim import effects
 from sim.effects import Form
 
 from .candidates import CHANNEL, Reach, Signatures, Start, forms, is_rich, starts
-from .data import Prepared
+from .data import Data, Prepared
 from .evidence import Evidence, believable, evidence_of, penalty, unexplained
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
-from .refit import Fit, extended, force_at, jacobian, reduced, refit
+from .refit import Fit, extended, force_at, jacobian, mean_square, reduced, refit
 
 Array = NDArray[np.float64]
 
@@ -33,6 +33,7 @@ PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexplained: so little more is none
+LITTLE = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
 CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 MOST_CAUSES = 3
@@ -53,12 +54,23 @@ class Trial:
         return self.cause.id
 
 
+@dataclass(frozen=True)
+class Measure:
+    """By which a χ² is judged: what noise alone leaves, the samples that say something of their own, and those that
+    say the same as one and count all the same."""
+
+    expected: float
+    effective: float
+    memory: float
+
+
 @dataclass
 class Path:
     """Causes in the order found, with the fits along the way (`fits[0]`: none of them) and what stood beside each."""
 
     fits: list[Fit]
     rivals: list[list[Trial]] = field(default_factory=list)
+    measures: list[Measure] = field(default_factory=list)
     evidence: list[Evidence] = field(default_factory=list)
 
 
@@ -70,12 +82,8 @@ class Search:
     ) -> None:
         """`known`: ids that detectors have found already."""
         self.prepared, self.progress, self.known = prepared, progress, tuple(known)
-        self.short = prepared.short
         self.believed = structure
         self.samples = float(prepared.full.weight.sum())
-        # what noise alone leaves of χ² on the stand-in, whose entries are means
-        self.expected = float(np.count_nonzero(self.short.weight > 0))
-        self.effective = max(self.samples, 20.0)
         full = prepared.full
         self.reach = Reach(
             sample_s=prepared.sample_s,
@@ -85,6 +93,21 @@ class Search:
             force_N=prepared.force_scale_N,
             rich=structure.in_air or is_rich(full),
         )
+
+    @property
+    def short(self) -> Data:
+        """What is searched on."""
+        return self.prepared.short
+
+    @property
+    def expected(self) -> float:
+        """What noise alone leaves of χ² on the stand-in, whose entries are means."""
+        return float(np.count_nonzero(self.short.weight > 0)) * float(np.sqrt(self.prepared.memory))
+
+    @property
+    def effective(self) -> float:
+        """Samples that say something of their own."""
+        return max(self.samples / self.prepared.memory, 20.0)
 
     # --- the believed structure ------------------------------------------------------------------------------------
 
@@ -183,7 +206,7 @@ class Search:
         """Ids whose first-order signature takes anything worth while, and those that have none."""
         promise = {id_: max((s.promise for s in found), default=0.0) for id_, found in by_id.items()}
         finite = [p for p in promise.values() if np.isfinite(p)]
-        least = max(0.01 * max(finite, default=0.0), 8.0)
+        least = max(0.01 * max(finite, default=0.0), 8.0 * self.prepared.memory)
         order = sorted((i for i in promise if promise[i] >= least), key=lambda i: -promise[i])
         return order[:WORTH]
 
@@ -234,7 +257,7 @@ class Search:
         best = trials[0]
         for t in trials[1:]:
             fewer = t.fit.free < best.fit.free
-            if fewer and t.fit.chi2 - best.fit.chi2 < PLAIN:
+            if fewer and t.fit.chi2 - best.fit.chi2 < PLAIN * self.prepared.memory:
                 best = t
         return best
 
@@ -269,12 +292,12 @@ class Search:
         at = fit.structure.of_cause(len(fit.structure.causes) - 1)
         x, lower, upper = fit.x[at], fit.structure.lower[at], fit.structure.upper[at]
         edge = float(np.sum((x <= lower + 1e-9) | (x >= upper - 1e-9)))  # a shape at its bound is another one's limit
-        unusual = 0.0 if cause.form.name == cause.effect.forms[0].name else LATER
-        unusual += edge * LATER
+        unusual = 0.0 if cause.form.name == cause.effect.forms[0].name else LATER * self.prepared.memory
+        unusual += edge * LATER * self.prepared.memory
         return Trial(cause, fit, fit.chi2 + self._penalty(fit) + unusual)
 
     def _penalty(self, fit: Fit) -> float:
-        return penalty(fit.free, self.effective)
+        return penalty(fit.free, self.effective) * self.prepared.memory
 
     def _carried(self, trial: Trial, steps: int) -> Trial:
         return self._trial(refit(self.short, trial.fit.structure, trial.fit.x, steps, 1e-8))
@@ -287,6 +310,7 @@ class Search:
         recurved = False
         begun = time.process_time()
         while len(path.fits) <= MOST_CAUSES and time.process_time() - begun < LONGEST_S:
+            self._whitened(path)
             every = [t for t in self.ranked(path.fits[-1]) if believable(t.fit, self.prepared)]
             present = {c.id for c in path.fits[-1].structure.causes}
             ranked = [t for t in every if t.id not in present]
@@ -298,6 +322,7 @@ class Search:
             base = path.fits[0]
             found = self.judge(now, best.fit, base)
             path.rivals.append(ranked)
+            path.measures.append(Measure(self.expected, self.effective, self.prepared.memory))
             path.evidence.append(found)
             gained = now.chi2 - best.fit.chi2
             more = found.pays or now.chi2 > MISFIT * self.expected
@@ -305,7 +330,7 @@ class Search:
                 recurved, other = True, self.recurved(now)
                 if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but one found of another shape
                     path.fits[-1] = other
-                    del path.rivals[-1], path.evidence[-1]
+                    del path.rivals[-1], path.measures[-1], path.evidence[-1]
                     continue
             if not found.pays or self._reshaped(now.chi2, best.fit.chi2, reshaped):
                 break
@@ -313,6 +338,15 @@ class Search:
             if len(path.fits) > 2 and best.fit.chi2 > 1.05 * self.expected:
                 path.fits[-1] = self.exchanged(path)
         return path
+
+    def _whitened(self, path: Path) -> None:
+        """Once little is left beside the noise, its colour goes into the cost."""
+        if self.prepared.memory == 1.0:
+            return
+        last, prepared = path.fits[-1], self.prepared
+        if mean_square(prepared.full, last.structure, last.x) < LITTLE * prepared.floor_N**2:
+            self.prepared = prepared.white()
+            path.fits = [refit(self.short, f.structure, f.x, 20, 1e-8) for f in path.fits]
 
     def _reshaped(self, before: float, after: float, reshaped: float) -> bool:
         """Whether another shape of a cause found does what a further cause did; not where that one leaves nothing, and
@@ -351,7 +385,7 @@ class Search:
 
     def judge(self, before: Fit, after: Fit, base: Fit) -> Evidence:
         """Whether the step from one fit to the next is more than chance, and more than a crumb."""
-        return evidence_of(before, after, base, self.samples, self.expected)
+        return evidence_of(before, after, base, self.prepared.memory, self.samples, self.expected)
 
     def exchanged(self, path: Path) -> Fit:
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it."""

@@ -13,7 +13,7 @@ from .held_out import held_out_square
 from .late import LATE
 from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
-from .search import Path, Search, Trial
+from .search import Measure, Path, Search, Trial
 
 RIVAL = 25.0  # Δχ², rescaled by what is left: less does not exclude a rival
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
@@ -79,24 +79,24 @@ def explains(left: float, causes: Sequence[CauseFound]) -> bool:
     return left <= EXPLAINED * sure * (0.5 if len(causes) >= MANY else 1.0)
 
 
-def stage_of(path: Path, id_: str) -> tuple[Trial | None, list[Trial], float]:
-    """Where a cause came in: (itself joined there, what stood beside it, χ² before)."""
-    stages = list(zip(path.fits, path.rivals, strict=False))
+def stage_of(path: Path, id_: str) -> tuple[Trial, list[Trial], float, Measure] | None:
+    """Where a cause came in: (itself joined there, what stood beside it, χ² before, by what χ² was judged)."""
+    stages = list(zip(path.fits, path.rivals, path.measures, strict=False))
     for first in (True, False):
-        for before, ranked in stages:
+        for before, ranked, measure in stages:
             own = [t for t in ranked if t.id == id_]
             if own and (not first or ranked[0].id == id_):
-                return own[0], [t for t in ranked if t.id != id_], before.chi2
-    return None, [], 0.0
+                return own[0], [t for t in ranked if t.id != id_], before.chi2, measure
+    return None
 
 
 def alternatives(
-    search: Search, fit: Fit, without_chi2: float, rivals: Sequence[Trial]
+    measure: Measure, fit: Fit, without_chi2: float, rivals: Sequence[Trial]
 ) -> tuple[list[Alternative], float, float]:
     """(those that the data cannot exclude, and the strongest rival; confidence in the name, and in its kind)."""
     best = fit.chi2
     # what the family's shape leaves counts as noise when names are compared: no shape is exact
-    scale = max(best / max(search.expected, 1.0), 1.0)
+    scale = max(best / max(measure.expected, 1.0), 1.0) * np.sqrt(measure.memory)
     gained = max(without_chi2 - best, 1e-12)
     out: list[Alternative] = []
     odds, of_others = 0.0, 0.0
@@ -104,10 +104,10 @@ def alternatives(
     for t in rivals:
         delta = t.fit.chi2 - best
         extra = t.fit.free - fit.free
-        effective = delta / scale + extra * np.log(search.effective)
+        effective = delta / scale + extra * np.log(measure.effective)
         share = float(np.clip((without_chi2 - t.fit.chi2) / gained, 0.0, 1.0))
         excluded = bool(effective > RIVAL and share < 0.995)
-        ratio = float(delta) / (unexplained(best, search.expected) + 1.0)
+        ratio = float(delta) / (unexplained(best, measure.expected) + 1.0)
         likely = float(np.exp(-0.5 * min(max(tempered(effective, share, ratio), 0.0), 200.0)))
         odds += likely
         of_others += 0.0 if late and t.id in LATE else likely
@@ -142,8 +142,12 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
     own = len(search.believed.causes)
     out = []
     for k, gain in enumerate(gains):
-        own_trial, rivals, before = stage_of(path, final.structure.causes[own + k].id)
-        others, confidence, kind = alternatives(search, own_trial.fit, before, rivals) if own_trial else ([], 0.5, 0.5)
+        stage = stage_of(path, final.structure.causes[own + k].id)
+        others: list[Alternative] = []
+        confidence = kind = 0.5
+        if stage is not None:
+            trial, rivals, before, measure = stage
+            others, confidence, kind = alternatives(measure, trial.fit, before, rivals)
         id_, form, numbers = described(final, own + k)
         effect = final.structure.causes[own + k].effect
         values = {name: number.value for name, number in numbers.items()}
