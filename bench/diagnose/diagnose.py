@@ -30,7 +30,7 @@ from .search import Path, Search
 from .spread import covariance
 from .swing import Swing
 from .swing import find as swinging
-from .verdict import chain, excesses, explains, found, ordered, without
+from .verdict import chain, excesses, explains, found, ordered, sureness, without
 from .write import model_of
 
 Array = NDArray[np.float64]
@@ -39,6 +39,7 @@ Mask = NDArray[np.bool_]
 TOLD = 0.002  # of the noise power
 LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and a further cause must take of what was
 # held out
+DOUBTED, LITTLE = 0.3, 0.08  # sure of a name, and of the error beyond the noise: a further cause with less is none
 HARM = 1.2  # times the square of the error of what comes later: a cause that makes more of it is none
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 SETTLED_S = 0.15  # after a move
@@ -71,7 +72,9 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     squares, excess = excesses(prepared, fits, floor)
     apart = _flagged_square(prepared, fits[0])
     while len(fits) > 1:
-        needless = _needless(prepared, fits, excess, apart)
+        needless = _needless(prepared, fits, squares, excess, apart)
+        if needless is None:
+            needless = _doubtful(path, fits, excess, apart)
         if needless is None:
             break
         fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + needless), base)
@@ -80,8 +83,13 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
 
 
-def _needless(prepared: Prepared, fits: list[Fit], excess: list[float], apart: float) -> int | None:
+def _needless(
+    prepared: Prepared, fits: list[Fit], squares: list[float], excess: list[float], apart: float
+) -> int | None:
     """Number of a cause that is of no use for what was held out, or does harm to what comes later; None: all are."""
+    taken = [a - b for a, b in zip(squares, squares[1:], strict=False)]
+    if min(taken) <= 0.0:
+        return int(np.argmin(taken))
     gains = [a - b for a, b in zip(excess, excess[1:], strict=False)]
     least = int(np.argmin(gains))
     small = gains[least] <= (LEAST if len(fits) == 2 else FURTHER) * (excess[0] + apart)
@@ -95,6 +103,16 @@ def _needless(prepared: Prepared, fits: list[Fit], excess: list[float], apart: f
     rest = [later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(len(gains))]
     best = int(np.argmin(rest))
     return best if later > HARM * rest[best] else None
+
+
+def _doubtful(path: Path, fits: list[Fit], excess: list[float], apart: float) -> int | None:
+    """Number of a further cause that takes little and whose name is hardly sure: what else may leave that."""
+    own = len(fits[0].structure.causes)
+    for k in range(len(fits) - 1, 1, -1):
+        _, confidence, kind = sureness(path, fits[-1].structure.causes[own + k - 1].id)
+        if max(confidence, kind) < DOUBTED and excess[k - 1] - excess[k] < LITTLE * (excess[0] + apart):
+            return k - 1
+    return None
 
 
 def _flagged_square(prepared: Prepared, fit: Fit) -> float:

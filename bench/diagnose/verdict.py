@@ -116,6 +116,15 @@ def alternatives(
     return out, 1.0 / (1.0 + odds), 1.0 / (1.0 + of_others)
 
 
+def sureness(path: Path, id_: str) -> tuple[list[Alternative], float, float]:
+    """`alternatives` of a cause that a search has found."""
+    stage = stage_of(path, id_)
+    if stage is None:
+        return [], 0.5, 0.5
+    trial, rivals, before, measure = stage
+    return alternatives(measure, trial.fit, before, rivals)
+
+
 def described(fit: Fit, index: int) -> tuple[str, str, dict[str, Number]]:
     """(id, form, numbers with standard errors) of a cause of a fit on all the data."""
     cause = fit.structure.causes[index]
@@ -142,12 +151,7 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
     own = len(search.believed.causes)
     out = []
     for k, gain in enumerate(gains):
-        stage = stage_of(path, final.structure.causes[own + k].id)
-        others: list[Alternative] = []
-        confidence = kind = 0.5
-        if stage is not None:
-            trial, rivals, before, measure = stage
-            others, confidence, kind = alternatives(measure, trial.fit, before, rivals)
+        others, confidence, kind = sureness(path, final.structure.causes[own + k].id)
         id_, form, numbers = described(final, own + k)
         effect = final.structure.causes[own + k].effect
         values = {name: number.value for name, number in numbers.items()}
