@@ -33,16 +33,6 @@ def test_a_larger_campaign_holds_the_smaller():
     assert {item.key for item in plan(4, 2, 1, 6, 8, 5)}.isdisjoint(keys)
 
 
-def test_files_of_results_that_are_there_can_be_carried_on():
-    # Keys of files that were written before the shapes had halves.
-    known = {
-        "single/missing_relaxation_mode/mode@0.125/209243171",
-        "large/backlash/soft_stops@2.5/480933772",
-        "single/force_delay/uneven@0.338/72305114",
-    }
-    assert known <= {item.key for item in plan(1, 9, 3, 0, 0, 0)}
-
-
 def test_a_plan_has_every_id_and_every_shape():
     most = max(len(EFFECTS[i].shapes) for i in CATALOGUE)
     items = [item for item in plan(1, most, 1, 4, 0, 0) if item.group == "single"]

@@ -13,6 +13,7 @@ from .effects import EFFECTS, Build, effect
 from .laws import Power
 from .motion import Path, rich
 from .pad import Pad
+from .sets import written_in
 
 CATALOGUE = (
     *("frame_compliance", "backlash", "contact_offset", "friction", "inertia", "resonance", "cogging", "force_delay"),
@@ -20,7 +21,7 @@ CATALOGUE = (
     *("encoder_error", "separation", "adhesion", "elastic_law", "stress_softening", "damage", "permanent_set"),
     *("missing_relaxation_mode", "depth_dependent_relaxation", "viscous_damping"),
 )
-SHAPES = [(id, shape) for id in CATALOGUE for shape in EFFECTS[id].shapes]
+SHAPES = written_in(CATALOGUE, "first", "second")
 SHORT = rich(2.0, (60.0, 8.0), hold_s=0.15, long_hold_s=0.6)
 
 

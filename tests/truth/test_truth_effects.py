@@ -14,6 +14,7 @@ from .effects.structure import _stretched
 from .laws import Exponential, Power
 from .motion import Path, rich, sampled, sinusoids
 from .pad import Pad, simulate
+from .sets import shapes_of
 
 SPRING = Pad(Power(3.0, 0.0))  # 3 N/mm, no relaxation
 SHORT = rich(2.0, (60.0, 8.0), hold_s=0.15, long_hold_s=0.6)
@@ -65,7 +66,7 @@ def test_two_springs_in_series():
     assert np.allclose(fine.force_N, 3 * x / (1 + 3 * 0.02), atol=1e-7)
 
 
-@pytest.mark.parametrize("shape", EFFECTS["frame_compliance"].shapes)
+@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "first", "second"))
 def test_the_frame_gives_way_by_what_the_cell_feels(shape):
     pad = Pad(Exponential(1.5, 0.6), (0.3, 0.2), (20.0, 1.0))
     fine, told, build = hidden("frame_compliance", shape, pad=pad)
@@ -83,7 +84,7 @@ def test_the_frame_gives_way_by_what_the_cell_feels(shape):
     assert np.max(np.abs(exact - fine.at(some, "pad_N"))) < 3e-4
 
 
-@pytest.mark.parametrize("shape", EFFECTS["backlash"].shapes)
+@pytest.mark.parametrize("shape", shapes_of("backlash", "first", "second"))
 def test_play_is_as_wide_as_stated(shape):
     motion = Path(-0.5).to(1.5, 5.0).to(0.5, 5.0).to(1.5, 5.0).to(-0.5, 5.0).motion()
     fine, told, _ = hidden("backlash", shape, motion=motion)
@@ -94,7 +95,7 @@ def test_play_is_as_wide_as_stated(shape):
     assert np.allclose(behind[down], told["gap"] + shift, atol=1e-9)
 
 
-@pytest.mark.parametrize("shape", EFFECTS["friction"].shapes)
+@pytest.mark.parametrize("shape", shapes_of("friction", "first", "second"))
 def test_friction_has_its_amplitude_on_either_side(shape):
     motion = Path(-1.5).hold(0.1).to(-0.5, 20.0).hold(0.1).to(-1.5, 20.0).hold(0.1).motion()
     fine, told, _ = hidden("friction", shape, motion=motion)
@@ -151,7 +152,7 @@ def test_inertia_cogging_and_encoder_error_in_closed_form():
 # --- sensor ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("shape", EFFECTS["sensor_lag"].shapes)
+@pytest.mark.parametrize("shape", shapes_of("sensor_lag", "first", "second"))
 def test_a_lag_is_late_by_its_time_constant(shape):
     motion = Path(0.0, np.inf).to(2.0, 10.0).hold(0.2).motion()
     fine, told, _ = hidden("sensor_lag", shape, motion=motion)
@@ -191,12 +192,12 @@ def test_bias_drift_and_hum():
     t = np.linspace(0, SHORT.duration_s, 20_000)
     samples, told = disturbed("force_bias", "constant", t)
     assert np.all(samples.clean_N == told["bias"]) and np.array_equal(samples.clean_N, samples.force_N)
-    for shape in EFFECTS["force_drift"].shapes:
+    for shape in shapes_of("force_drift", "first", "second"):
         samples, told = disturbed("force_drift", shape, t)
         assert samples.clean_N[0] == 0
         assert samples.clean_N[5] / t[5] == pytest.approx(told["rate"], rel=2e-3)
         assert np.all(np.diff(np.sign(told["rate"]) * samples.clean_N) > 0)
-    for shape in EFFECTS["mains_hum"].shapes:
+    for shape in shapes_of("mains_hum", "first", "second"):
         samples, told = disturbed("mains_hum", shape, t)
         waves = np.stack([f(2 * np.pi * told["frequency"] * t) for f in (np.sin, np.cos)], axis=1)
         fit = np.linalg.lstsq(waves, samples.clean_N, rcond=None)[0]
@@ -229,7 +230,7 @@ def cycles(*depths, speed=5.0):
 
 def test_adhesion():
     motion = Path(-0.5).to(1.0, 2.0).hold(0.1).to(-0.5, 2.0).motion()
-    for shape in EFFECTS["adhesion"].shapes:
+    for shape in shapes_of("adhesion", "first", "second"):
         fine, told, _ = hidden("adhesion", shape, motion=motion)
         assert fine.force_N.min() == pytest.approx(-told["pull_off"], rel=0.02)
         half = fine.time_s < 0.8
@@ -245,7 +246,7 @@ def test_adhesion():
             assert np.all(fine.force_N[~half & (x < -1.01 * told["range"])] == 0)
 
 
-@pytest.mark.parametrize("shape", EFFECTS["stress_softening"].shapes)
+@pytest.mark.parametrize("shape", shapes_of("stress_softening", "first", "second"))
 def test_softening_spares_the_virgin_curve(shape):
     fine, told, _ = hidden("stress_softening", shape, motion=cycles(1.0, 0.0, 1.6, 0.0, 2.0))
     x, force = fine.reported_mm, fine.force_N
@@ -270,7 +271,7 @@ def test_softening_spares_the_virgin_curve(shape):
         )
 
 
-@pytest.mark.parametrize("shape", EFFECTS["damage"].shapes)
+@pytest.mark.parametrize("shape", shapes_of("damage", "first", "second"))
 def test_damage_goes_with_the_path_of_loading(shape):
     fine, told, build = hidden("damage", shape, 2.0, motion=cycles(2.0, 0.0, 2.0, 0.0, 2.0, 0.0, 2.0))
     x, rate = fine.reported_mm, told["rate"]
@@ -286,7 +287,7 @@ def test_damage_goes_with_the_path_of_loading(shape):
     assert np.allclose(kept, expected[x > 0.1], atol=1e-6)
 
 
-@pytest.mark.parametrize("shape", EFFECTS["permanent_set"].shapes)
+@pytest.mark.parametrize("shape", shapes_of("permanent_set", "first", "second"))
 def test_the_surface_sinks(shape):
     fine, told, build = hidden("permanent_set", shape, motion=cycles(1.0, 0.0, 2.0, 0.0))
     deepest, s = np.maximum.accumulate(fine.reported_mm), told["set"]
@@ -300,7 +301,7 @@ def test_the_surface_sinks(shape):
     assert np.allclose(fine.force_N, 3 * np.maximum(fine.reported_mm - sunk, 0), atol=1e-6)
 
 
-@pytest.mark.parametrize("shape", EFFECTS["viscous_damping"].shapes)
+@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "first", "second"))
 def test_damping_on_a_spring(shape):
     motion = Path(-0.5).to(1.9, 20.0).hold(0.1).to(0.5, 20.0).hold(0.1).motion()
     fine, told, _ = hidden("viscous_damping", shape, motion=motion)
@@ -314,7 +315,7 @@ def test_damping_on_a_spring(shape):
     assert away.force_N.min() == 0
 
 
-@pytest.mark.parametrize("shape", EFFECTS["depth_dependent_relaxation"].shapes)
+@pytest.mark.parametrize("shape", shapes_of("depth_dependent_relaxation", "first", "second"))
 def test_rates_change_with_depth(shape):
     pad = Pad(Power(3.0, 0.0), (0.4,), (2.0,))
     for seed in (0, 1, 2):

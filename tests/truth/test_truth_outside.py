@@ -5,15 +5,15 @@ import pytest
 
 from .cases import draw_case
 from .detect import misfit
-from .effects import EFFECTS
 from .effects.outside_pad import _activated, _bonds, _film, _jammed
 from .motion import Path, rich
 from .pad import Pad
+from .sets import outside, written_in
 from .test_truth_cases import CATALOGUE
 from .test_truth_effects import SPRING, disturbed, hidden
 
-OUTSIDE = sorted(id for id in set(EFFECTS) - set(CATALOGUE))
-SHAPES = [(id, shape) for id in OUTSIDE for shape in EFFECTS[id].shapes]
+OUTSIDE = outside(CATALOGUE, "first", "second")
+SHAPES = written_in(tuple(OUTSIDE), "first", "second")
 MOTION = rich(2.0, (60.0, 8.0), hold_s=0.4, long_hold_s=3.0)
 PLAIN = {"motion": MOTION, "rate_hz": 200.0, "noise_kind": "white", "own_clock": False, "jitter": "none"}
 

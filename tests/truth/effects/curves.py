@@ -14,6 +14,11 @@ import numpy as np
 from ..laws import Law, _Tabulated
 
 
+def stretched(depth_mm: np.ndarray, thickness_mm: float) -> np.ndarray:
+    """Stretch λ = 1 − δ/H of a block of thickness H; never below 0.05."""
+    return np.maximum(1 - depth_mm / thickness_mm, 0.05)
+
+
 @dataclass(frozen=True)
 class MooneyRivlin(_Tabulated):
     """Nominal stress of a block of thickness H: F = A (λ^{−2} − λ) + B (λ^{−3} − 1), λ = 1 − δ/H."""
@@ -24,7 +29,7 @@ class MooneyRivlin(_Tabulated):
     thickness: float
 
     def curve(self, depth_mm: np.ndarray) -> np.ndarray:
-        stretch = np.maximum(1 - depth_mm / self.thickness, 0.05)
+        stretch = stretched(depth_mm, self.thickness)
         return self.first * (stretch**-2 - stretch) + self.second * (stretch**-3 - 1)
 
 

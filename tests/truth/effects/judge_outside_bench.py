@@ -9,163 +9,174 @@ import numpy as np
 from numba import njit
 
 from .outside_bench import _AMPLIFIER, _child
-from .plant import acceleration
 from .registry import Build, judge_effect, spread
-from .sensor import _disturb, second_order
-
-
-@judge_effect("knocks", "table", "thump")
-def knocks(build: Build, shape: str, size: float) -> dict[str, float]:
-    """Somebody works at the same table: every 2 to 5 s, at random (a Poisson process; Rice 1944), another knock.
-
-    `table`: it rings at 8 to 20 Hz for some tenths of a second. `thump`: a pulse to one side, t/τ e^{1−t/τ}.
-    """
-    rng = build.rng
-    amplitude, every_s = 0.12 * size * build.force_N * spread(rng, 0.8, 1.25), spread(rng, 2.0, 5.0)
-    ring_Hz, lasts_s, pulse_s = spread(rng, 8.0, 20.0), spread(rng, 0.15, 0.4), spread(rng, 0.05, 0.15)
-    child = _child(rng)
-    count = int(np.ceil(3 * (build.plant.duration_s + 10) / every_s)) + 20
-    begins, sizes = np.cumsum(child.exponential(every_s, count)), child.uniform(-1, 1, count)
-
-    def added(t):
-        out = np.zeros_like(t)
-        for begin, weight in zip(begins, sizes, strict=True):
-            s = t - begin
-            near = (s > 0) & (s < 5.0)
-            s = s[near]
-            if shape == "table":
-                out[near] += weight * np.exp(-s / lasts_s) * np.sin(2 * np.pi * ring_Hz * s)
-            else:
-                out[near] += weight * s / pulse_s * np.exp(1 - s / pulse_s)
-        return amplitude * out
-
-    _disturb(build, added)
-    told = {"frequency": ring_Hz, "lasts": lasts_s} if shape == "table" else {"lasts": pulse_s}
-    return {"amplitude": amplitude, "every": every_s} | told
-
-
-@judge_effect("jumping_delay", "two_routes", "lost_frames")
-def jumping_delay(build: Build, shape: str, size: float) -> dict[str, float]:
-    """How late the force is jumps, every few seconds at random; no delay and no rate of a clock says when.
-
-    `two_routes`: one of two ways through a network. `lost_frames`: samples are counted and some never come, so that
-    what is counted runs ahead more and more, until both ends start anew.
-    """
-    rng = build.rng
-    late_s, dwell_s = 0.02 * size * spread(rng, 0.8, 1.25), spread(rng, 2.0, 5.0)
-    child = _child(rng)
-    count = int(np.ceil(4 * (build.plant.duration_s + 10) / dwell_s)) + 20
-    times = np.cumsum(child.exponential(dwell_s, count))
-    if shape == "two_routes":
-        levels = np.resize([0.0, 1.0], count + 1)
-    else:
-        levels, level = np.zeros(count + 1), 0.0
-        for k in range(1, count + 1):
-            level = 0.0 if child.random() < 0.3 else level - child.uniform(0.2, 0.8)
-            levels[k] = level
-    build.delays.append(lambda t, _: t - late_s * levels[np.minimum(np.searchsorted(times, t), count)])
-    return {"late": late_s, "dwell": dwell_s}
+from .sensor import _disturb
+from .third_outside_bench import _fades
 
 
 @njit(cache=True)
-def _fades(values, h, tau):
-    out, kept = np.zeros(values.shape[0]), np.exp(-h / tau)
-    for k in range(1, values.shape[0]):
-        out[k] = values[k] + (out[k - 1] - values[k]) * kept
+def _zeroed(force, h, band_N, calm_N_s, waits_s, rate_N_s):
+    """What is left less a zero, which goes towards it at `rate_N_s` once that was small and calm a while.
+
+    The zero stays within the band.
+    """
+    out, zero, calm_s = np.zeros(force.shape[0]), 0.0, 0.0
+    for k in range(1, force.shape[0]):
+        left = force[k] - zero
+        calm = abs(left) < band_N and abs(force[k] - force[k - 1]) < calm_N_s * h
+        calm_s = calm_s + h if calm else 0.0
+        if calm_s > waits_s:
+            zero += min(max(left, -rate_N_s * h), rate_N_s * h)
+            zero = min(max(zero, -band_N), band_N)
+        out[k] = force[k] - zero
     return out
 
 
-@judge_effect("supply_droop", "quick", "slow")
-def supply_droop(build: Build, shape: str, size: float) -> dict[str, float]:
-    """Bridge and motor share a supply: while the motor moves, either way, the cell's gain drops, and comes back.
+@judge_effect("zero_tracking", "tracks", "tares")
+def zero_tracking(build: Build, shape: str, size: float) -> dict[str, float]:
+    """An indicator takes a small load that is calm for a drifting zero, and takes it off (OIML R 76, zero tracking).
 
-    `quick`: within 60 to 200 ms. `slow`: within 2 to 5 s, as a regulator warms. Cells whose supply is not measured
-    along read in proportion to it (six wires or four; HBM, Wägezellen).
-    """
-    rng, motion = build.rng, build.plant.motion
-    drop = 0.16 * size * spread(rng, 0.8, 1.25)
-    tau = spread(rng, 0.06, 0.2) if shape == "quick" else spread(rng, 2.0, 5.0)
-
-    def stage(t, force):
-        drawn = _fades((np.abs(motion.velocity(t)) > 1e-6).astype(float), t[1] - t[0], tau)
-        return force * (1 - min(drop, 0.5) * drawn / max(np.max(drawn), 1e-9))
-
-    build.sensor(_AMPLIFIER, stage)
-    return {"drop": drop, "time_constant": tau}
-
-
-@judge_effect("rocking_bench", "one_way", "two_ways")
-def rocking_bench(build: Build, shape: str, size: float) -> dict[str, float]:
-    """Each move kicks a bench on soft feet, which rocks at 2 to 6 Hz for seconds (Rivin, Passive Vibration Isolation).
-
-    Pad and probe stand on it at different heights and swing against each other. `two_ways`: it pitches and bounces at
-    frequencies 1.3 to 1.8 apart, half each. The greatest swing of the run is the amplitude.
-    """
-    rng, motion = build.rng, build.plant.motion
-    frequency, damping, ratio = spread(rng, 2.0, 6.0), spread(rng, 0.01, 0.04), float(rng.uniform(1.3, 1.8))
-    amplitude = 0.06 * size * spread(rng, 0.8, 1.25) * build.depth_mm
-
-    def height(t, x):
-        kicks = acceleration(motion, t)
-        y = second_order(t, kicks, frequency, damping)
-        if shape == "two_ways":
-            other = second_order(t, kicks, ratio * frequency, damping)
-            y = y / np.max(np.abs(y)) + other / np.max(np.abs(other))
-        return amplitude * y / np.max(np.abs(y))
-
-    build.plant.height.append(height)
-    return {"frequency": frequency, "damping_ratio": damping, "amplitude": amplitude}
-
-
-@njit(cache=True)
-def _steadied(force, h, band, slow_s, quick_s, latches):
-    """Follows within `quick_s` outside the band about what is shown, within `slow_s` inside; or jumps, and stays."""
-    out, y = np.zeros(force.shape[0]), force[0]
-    slow, quick = -np.expm1(-h / slow_s), -np.expm1(-h / quick_s)
-    for k in range(force.shape[0]):
-        off = force[k] - y
-        if latches:
-            y = force[k] if abs(off) > band else y
-        else:
-            y += off * (quick if abs(off) > band else slow)
-        out[k] = y
-    return out
-
-
-@judge_effect("steady_display", "adaptive", "latched")
-def steady_display(build: Build, shape: str, size: float) -> dict[str, float]:
-    """A weighing indicator calms what it shows: within a band it hardly follows, outside at once (OIML R 76).
-
-    `adaptive`: within the band it follows in 1.5 to 4 s. `latched`: it shows the last value until the band is left.
+    After 0.15 to 0.3 s. `tracks`: slowly, the band within 1 to 3 s. `tares`: at once. What it took is missing at all
+    greater loads, until it has been calm in air.
     """
     rng = build.rng
-    band = 0.035 * size * build.force_N * spread(rng, 0.8, 1.25)
-    slow_s, quick_s = spread(rng, 1.5, 4.0), spread(rng, 0.003, 0.01)
-    latches = shape == "latched"
-    build.sensor(_AMPLIFIER, lambda t, force: _steadied(force, t[1] - t[0], band, slow_s, quick_s, latches))
-    return {"band": band, "slow": slow_s}
+    band, waits_s = (
+        0.1 * size * build.force_N * spread(rng, 0.8, 1.25),
+        spread(rng, 0.15, 0.3),
+    )
+    rate = band / (spread(rng, 1.0, 3.0) if shape == "tracks" else 0.01)
+    calm = 0.5 * build.force_N
+    build.sensor(_AMPLIFIER, lambda t, force: _zeroed(force, t[1] - t[0], band, calm, waits_s, rate))
+    return {"band": band, "rate": rate}
 
 
-@judge_effect("wandering_zero", "reverting", "flicker")
-def wandering_zero(build: Build, shape: str, size: float) -> dict[str, float]:
-    """The zero wanders and comes back, as in a draught: no line, no steps and no tone.
+@judge_effect("machinery", "fan", "pump")
+def machinery(build: Build, shape: str, size: float) -> dict[str, float]:
+    """A fan nearby that comes and goes, or a pump with its strokes, felt in air too (Norton, Noise and Vibration).
 
-    `reverting`: an Ornstein–Uhlenbeck process of 1 to 4 s. `flicker`: a power of 1/f, the sum of six from 0.1 to 30 s
-    (van der Ziel 1950).
+    `fan`: on and off every 3 to 8 s, at random; it runs up and down within 0.4 to 1 s, and shakes as its speed squared.
+    `pump`: a half sine for each of 1 to 2.5 strokes a second, each of another length, by a tenth, and another height.
     """
-    rng = build.rng
-    deviation = 0.025 * size * build.force_N * spread(rng, 0.8, 1.25)
-    middle_s = spread(rng, 1.0, 4.0)
-    times = np.array([middle_s]) if shape == "reverting" else np.geomspace(0.1, 30.0, 6)
-    child, step_s = _child(rng), 0.01
-    count = int(np.ceil((build.plant.duration_s + 1) / step_s)) + 2
-    keeps = np.exp(-step_s / times)
-    pushes = child.standard_normal((count, len(times))) * np.sqrt((1 - keeps**2) / len(times))
-    pushes[0] /= np.sqrt(1 - keeps**2)
-    states = np.zeros_like(pushes)
-    states[0] = pushes[0]
-    for k in range(1, count):
-        states[k] = keeps * states[k - 1] + pushes[k]
-    path = deviation * np.sum(states, axis=1)
-    _disturb(build, lambda t: np.interp(t, step_s * np.arange(count), path))
-    return {"deviation": deviation}
+    rng, duration = build.rng, build.plant.duration_s
+    amplitude = 0.04 * size * build.force_N * spread(rng, 0.8, 1.25)
+    if shape == "pump":
+        period, child = 1 / spread(rng, 1.0, 2.5), _child(rng)
+        count = int(np.ceil(2 * (duration + 10) / period)) + 10
+        lengths = period * np.clip(1 + 0.1 * child.standard_normal(count), 0.6, 1.4)
+        begins, heights = np.concatenate([[0.0], np.cumsum(lengths)[:-1]]), child.uniform(0.6, 1.4, count)
+
+        def strokes(t):
+            k = np.clip(np.searchsorted(begins, t, side="right") - 1, 0, count - 1)
+            return 1.5 * amplitude * heights[k] * np.maximum(np.sin(2 * np.pi * (t - begins[k]) / lengths[k]), 0.0)
+
+        _disturb(build, strokes)
+        return {"amplitude": amplitude, "frequency": 1 / period}
+    frequency, dwell_s, runs_up_s = spread(rng, 12.0, 35.0), spread(rng, 3.0, 8.0), spread(rng, 0.4, 1.0)
+    child, step_s = _child(rng), 1e-3
+    count = int(np.ceil(4 * (duration + 10) / dwell_s)) + 20
+    switched = np.cumsum(child.exponential(dwell_s, count))
+    grid = np.arange(0.0, duration + 1.0, step_s)
+    speed = _fades(np.searchsorted(switched, grid) % 2 == 0, step_s, runs_up_s)
+    turned = 2 * np.pi * frequency * step_s * np.cumsum(speed)
+    _disturb(build, lambda t: amplitude * np.interp(t, grid, speed**2) * np.sin(np.interp(t, grid, turned)))
+    return {"amplitude": amplitude, "frequency": frequency}
+
+
+def _wandering(child: np.random.Generator, duration_s: float, time_s: float, step_s: float = 0.01):
+    """An Ornstein–Uhlenbeck process of deviation 1, as a function of time."""
+    keeps = np.exp(-step_s / time_s)
+    path = child.standard_normal(int(np.ceil((duration_s + 1) / step_s)) + 2)
+    path[1:] *= np.sqrt(1 - keeps**2)
+    for k in range(1, len(path)):
+        path[k] += keeps * path[k - 1]
+    return lambda t: np.interp(t, step_s * np.arange(len(path)), path)
+
+
+@judge_effect("sense_wire", "two_level", "wanders")
+def sense_wire(build: Build, shape: str, size: float) -> dict[str, float]:
+    """A bad contact in the bridge's supply or sense wires: the gain changes, the zero does not (HBM, Wägezellen).
+
+    `two_level`: it opens and closes at random times, every 1 to 4 s (Rice 1944). `wanders`: an Ornstein–Uhlenbeck
+    process of 1.5 to 5 s, as of a corroded pin.
+    """
+    rng, duration = build.rng, build.plant.duration_s
+    drop, dwell_s = 0.1 * size * spread(rng, 0.8, 1.25), spread(rng, 1.0, 4.0)
+    time_s, child = spread(rng, 1.5, 5.0), _child(rng)
+    if shape == "two_level":
+        times = np.cumsum(child.exponential(dwell_s, int(np.ceil(4 * (duration + 10) / dwell_s)) + 20))
+        build.sensor(_AMPLIFIER, lambda t, force: force * (1 - drop * (np.searchsorted(times, t) % 2)))
+        return {"drop": drop, "dwell": dwell_s}
+    along = _wandering(child, duration, time_s)
+    build.sensor(_AMPLIFIER, lambda t, force: force * (1 + 0.8 * drop * along(t)))
+    return {"drop": drop, "time": time_s}
+
+
+@judge_effect("loose_screw", "each_move", "hard_moves")
+def loose_screw(build: Build, shape: str, size: float) -> dict[str, float]:
+    """A cell that is not screwed tight seats itself anew as it is pushed about, and its zero is another one each time.
+
+    `each_move`: evenly spread, a new one in each move, in air too. `hard_moves`: only in moves that are quicker than
+    the middle one, or as quick (VDI/VDE 2638 wants cells to be seated under load before use).
+    """
+    rng, motion = build.rng, build.plant.motion
+    step, child = 0.035 * size * build.force_N * spread(rng, 0.8, 1.25), _child(rng)
+    middle = (motion.breaks_s[1:] + motion.breaks_s[:-1]) / 2
+    speed = np.abs(motion.velocity(middle))
+    moves = speed > 1e-6
+    begins = np.flatnonzero(moves & ~np.concatenate([[False], moves[:-1]]))
+    ends = np.flatnonzero(moves & ~np.concatenate([moves[1:], [False]]))
+    top = np.array([speed[i : j + 1].max() for i, j in zip(begins, ends, strict=True)])
+    chosen = ends if shape == "each_move" else ends[top >= (1 - 1e-9) * np.median(top)]
+    when = motion.breaks_s[chosen + 1]
+    zeros = np.concatenate([[0.0], step * child.uniform(-np.sqrt(3.0), np.sqrt(3.0), len(when))])
+    _disturb(build, lambda t: zeros[np.searchsorted(when, t)])
+    return {"step": step}
+
+
+@judge_effect("loose_head", "wanders", "jumps")
+def loose_head(build: Build, shape: str, size: float) -> dict[str, float]:
+    """A read head or scale that is not fixed: the loop follows it, now more and now less.
+
+    `wanders`: an Ornstein–Uhlenbeck process of 1.5 to 5 s, as of glue in a draught. `jumps`: between two places, at
+    random times every 1 to 3 s (Rice 1944).
+    """
+    rng, duration = build.rng, build.plant.duration_s
+    off = 0.02 * size * build.depth_mm * spread(rng, 0.8, 1.25)
+    time_s, dwell_s, child = spread(rng, 1.5, 5.0), spread(rng, 1.0, 3.0), _child(rng)
+    told = {"off": off, "time": time_s} if shape == "wanders" else {"off": off, "dwell": dwell_s}
+    along = _wandering(child, duration, time_s)
+    times = np.cumsum(child.exponential(dwell_s, int(np.ceil(4 * (duration + 10) / dwell_s)) + 20))
+
+    def moved(t):
+        if shape == "wanders":
+            return off * along(t)
+        return 2 * off * _fades((np.searchsorted(times, t) % 2).astype(float), t[1] - t[0], 0.01)
+
+    # The loop makes the reported position right, and the true one wrong.
+    build.plant.motor.append(lambda t, x: x - moved(t))
+    build.plant.encoder.append(lambda t, x: x + moved(t))
+    return told
+
+
+@judge_effect("idle_current", "halved", "detents")
+def idle_current(build: Build, shape: str, size: float) -> dict[str, float]:
+    """A stepper's driver lowers its current a while after each move, and the load pushes the probe back (Acarnley).
+
+    After 0.3 to 1 s, until the next move; nothing reports it. `halved`: in proportion to the load. `detents`: to the
+    next place where the rotor holds by itself, which lies otherwise each time, and only under a fifth of the load.
+    """
+    rng, motion, law, most = build.rng, build.plant.motion, build.plant.pad.law, build.force_N
+    gives, waits_s, child = 0.06 * size * build.depth_mm * spread(rng, 0.8, 1.25), spread(rng, 0.3, 1.0), _child(rng)
+    places = child.uniform(0.2, 1.0, 4096)
+
+    def back(t, x):
+        moves = np.abs(motion.velocity(t)) > 1e-6
+        last = np.maximum.accumulate(np.where(moves, np.arange(len(t)), 0))
+        idle = (t - t[last] > waits_s) & ~moves
+        load = np.clip(law.force(np.maximum(x, 0.0)) / most, 0.0, 1.2)
+        rests = np.cumsum(np.diff(idle.astype(int), prepend=0) > 0)
+        pushed = load if shape == "halved" else places[rests % len(places)] * (load > 0.2)
+        return x - gives * _fades(np.where(idle, pushed, 0.0), t[1] - t[0], 0.01)
+
+    build.plant.play.append(back)
+    return {"gives": gives, "waits": waits_s}

@@ -9,7 +9,8 @@ stress softening by Ogden and Roxburgh (1999), exponential (Miehe 1995), Zúñig
 (2003); damage by Kachanov (1958); adhesion after Derjaguin, Muller, Toporov (1975), Johnson, Kendall, Roberts (1971),
 a capillary bridge of constant volume (Maugis 1987), van der Waals forces of a sphere and a plane (Derjaguin 1934,
 Hamaker 1937), a bilinear law of traction and separation (Alfano and Crisfield 2001); joints after Hertz (1882); damage
-by the load (Miner 1945); flow after Eyring (1936). Units: mm, N, s.
+by the load (Miner 1945); flow after Eyring (1936). Those of the judge half are named where they are registered.
+Units: mm, N, s.
 """
 
 from __future__ import annotations
@@ -28,11 +29,14 @@ class Numbers(NamedTuple):
     unilateral: bool = True
     stick_N: float = 0.0  # tension at which an attached surface lets go
     stick_once: bool = False
+    stick_Ns: float = 0.0  # impulse of tension that a film bears
     offset_mm: float = 0.0  # surface below the zero of position
-    frame_form: int = 0  # 1 linear, 2 stiffening, 3 softer beyond a preload, 4 Hertz
+    frame_form: int = 0  # 1 linear, 2 stiffening, 3 softer beyond a preload, 4 Hertz, 5 creeps, 6 slips
     frame_mm_N: float = 0.0
     frame_force_N: float = 1.0
     frame_stiff_share: float = 1.0
+    frame_late_share: float = 0.0
+    frame_late_s: float = 1.0
     friction_form: int = 0  # 1 Coulomb, 2 Stribeck, 3 Dahl, 4 LuGre, 5 Maxwell slip
     coulomb_N: float = 0.0
     presliding_mm: float = 1e-3
@@ -40,20 +44,24 @@ class Numbers(NamedTuple):
     stribeck_mm_s: float = 1.0
     bristle_Ns_mm: float = 0.0
     slide_Ns_mm: float = 0.0
-    softening_form: int = 0  # 1 exponential, 2 Ogden–Roxburgh, 3 Beatty, 4 Dorfmann–Ogden, 5 ratio
+    softening_form: int = 0  # 1 exponential, 2 Ogden–Roxburgh, 3 Beatty, 4 Dorfmann–Ogden, 5 ratio, 6 linear, 7 Simo
     softening_share: float = 0.0
     softening_mm: float = 1.0
     softening_Nmm: float = 1.0
-    damage_form: int = 0  # 1 exponential, 2 Kachanov, 3 saturating, 4 logarithmic, 5 hyperbolic, 6 by load
+    damage_form: int = (
+        0  # 1 exponential, 2 Kachanov, 3 saturating, 4 logarithmic, 5 hyperbolic, 6 by load, 7 deep, 8 power
+    )
     damage_per_mm: float = 0.0
     damage_limit: float = 1.0
     set_form: int = 0  # 1 linear, 2 saturating, 3 beyond a yield depth, 4 progressive
     set_mm_mm: float = 0.0
     set_limit_mm: float = 1.0
-    adhesion_form: int = 0  # 1 exponential, 2 snaps off, 3 neck, 4 bridge, 5 van der Waals, 6 bilinear
+    adhesion_form: int = (
+        0  # 1 exponential, 2 snaps off, 3 neck, 4 bridge, 5 van der Waals, 6 bilinear, 7 fibrils, 8 by rate
+    )
     pull_off_N: float = 0.0
     adhesion_mm: float = 1.0
-    damping_form: int = 0  # 1 linear, 2 with depth, 3 thinning, 4 thickening, 5 Eyring, 6 one-sided
+    damping_form: int = 0  # 1 linear, 2 with depth, 3 thinning, 4 thickening, 5 Eyring, 6 one-sided, 7 √depth, 8 load
     damping_Ns_mm: float = 0.0
     damping_ref: float = 1.0
     rate_form: int = 0  # 1 linear, 2 exponential, 3 saturating, 4 free volume, 5 up to a knee, 6 each mode its own
@@ -63,8 +71,9 @@ class Numbers(NamedTuple):
 
 
 # State: deepest raw depth, deepest depth, path of loading, surface and the one before, u, whether in contact (and
-# for how many nodes), whether attached by adhesion, probe position, whether a bond that bears once has broken.
-_RAW, _DEEPEST, _PATH, _S, _S1, _U, _CONTACT, _ATTACHED, _X, _BROKEN = range(10)
+# for how many nodes), whether attached by adhesion, probe position, whether a bond that bears once has broken, impulse
+# of the tension so far.
+_RAW, _DEEPEST, _PATH, _S, _S1, _U, _CONTACT, _ATTACHED, _X, _BROKEN, _PULLED = range(11)
 _SLIPS = 6
 
 
@@ -108,6 +117,11 @@ def _elastic(p, table, depth, deepest, keep):
             u *= 1 - p.softening_share * math.tanh(lost / p.softening_Nmm)
         elif p.softening_form == 5:
             u *= (depth / deepest) ** p.softening_share
+        elif p.softening_form == 6:
+            u *= 1 - p.softening_share * min(0.5 * below / p.softening_mm, 1.0)
+        elif p.softening_form == 7:  # D(δ) = D_∞ (1 − e^{−δ/d}); the law is the virgin curve, D in it
+            whole = 1 + p.softening_share * math.expm1(-deepest / p.softening_mm)
+            u *= whole / (1 + p.softening_share * math.expm1(-depth / p.softening_mm))
         else:
             u *= math.exp(-p.softening_share * math.sqrt(below / p.softening_mm))
     return u
@@ -118,7 +132,7 @@ def _kept(p, path):
     """Share of the stiffness that is left after a path of loading, mm."""
     if p.damage_form == 0:
         return 1.0
-    if p.damage_form == 1 or p.damage_form == 6:
+    if p.damage_form == 1 or p.damage_form == 6 or p.damage_form == 7:
         return math.exp(-p.damage_per_mm * path)
     if p.damage_form == 2:  # dD/dλ = r / (1 − D)²
         return max(1 - 3 * p.damage_per_mm * path, 0.01) ** (1 / 3)
@@ -126,6 +140,8 @@ def _kept(p, path):
         return max(1 - p.damage_per_mm * p.damage_limit * math.log1p(path / p.damage_limit), 0.01)
     if p.damage_form == 5:
         return 1 / (1 + p.damage_per_mm * path)
+    if p.damage_form == 8:
+        return (1 + path / p.damage_limit) ** (-p.damage_per_mm * p.damage_limit)
     return 1 + p.damage_limit * math.expm1(-p.damage_per_mm * path / p.damage_limit)
 
 
@@ -144,7 +160,7 @@ def _sunk(p, deepest):
 
 
 @njit(cache=True)
-def _damped(p, speed, depth):
+def _damped(p, table, speed, depth):
     if p.damping_form == 0 or depth <= 0:
         return 0.0
     if p.damping_form == 1:
@@ -155,6 +171,10 @@ def _damped(p, speed, depth):
         return p.damping_Ns_mm * p.damping_ref * math.asinh(speed / p.damping_ref)
     if p.damping_form == 6:
         return p.damping_Ns_mm * speed * (1 + math.copysign(p.damping_ref, speed))
+    if p.damping_form == 7:
+        return p.damping_Ns_mm * speed * math.sqrt(depth / p.damping_ref)
+    if p.damping_form == 8:
+        return p.damping_Ns_mm * speed * _law(table, depth, p.table_mm) / p.damping_ref
     exponent = 0.7 if p.damping_form == 3 else 1.3
     return math.copysign(p.damping_Ns_mm * p.damping_ref * (abs(speed) / p.damping_ref) ** exponent, speed)
 
@@ -191,7 +211,7 @@ def _friction(p, slips, dx, new):
 
 
 @njit(cache=True)
-def _deflection(p, force):
+def _deflection(p, force, late, new):
     if p.frame_form == 2:
         return math.copysign(p.frame_mm_N * p.frame_force_N * math.log1p(abs(force) / p.frame_force_N), force)
     if p.frame_form == 3 and force <= p.frame_force_N:
@@ -201,6 +221,12 @@ def _deflection(p, force):
     if p.frame_form == 4:
         pressed = (1 + abs(force) / p.frame_force_N) ** (2 / 3) - 1
         return math.copysign(1.5 * p.frame_mm_N * p.frame_force_N * pressed, force)
+    if p.frame_form == 5:
+        new[0] = force + (late[0] - force) * math.exp(-p.step_s / p.frame_late_s)
+        return p.frame_mm_N * ((1 - p.frame_late_share) * force + p.frame_late_share * new[0])
+    if p.frame_form == 6:
+        new[0] = min(max(late[0], force - p.frame_force_N), force + p.frame_force_N)
+        return p.frame_mm_N * ((1 - p.frame_late_share) * force + p.frame_late_share * new[0])
     return p.frame_mm_N * force
 
 
@@ -212,7 +238,7 @@ def _surface(p, table, held, remembered, keep, deepest, low, high):
         s = 0.5 * (a + b)
         if b - a < 1e-9:
             break
-        left = held * _elastic(p, table, s, deepest, keep) - remembered + _damped(p, (s - high) / p.step_s, s)
+        left = held * _elastic(p, table, s, deepest, keep) - remembered + _damped(p, table, (s - high) / p.step_s, s)
         if left > 0:
             b = s
         else:
@@ -232,6 +258,8 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
     way = max(inner - state[_S], 0.0)
     if p.damage_form == 6:
         way *= (inner + state[_S]) / p.damage_limit
+    elif p.damage_form == 7:
+        way = max(inner - max(state[_S], p.damage_limit), 0.0)
     new[_PATH] = state[_PATH] + way
     keep = gain * _kept(p, new[_PATH])
     u = _elastic(p, table, inner, new[_DEEPEST], keep)
@@ -244,10 +272,11 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
         speed = (3 * inner - 4 * state[_S] + state[_S1]) / (2 * p.step_s)
     else:
         speed = (inner - state[_S]) / p.step_s
-    force = held * u - remembered + _damped(p, speed, inner)
+    force = held * u - remembered + _damped(p, table, speed, inner)
     new[_S] = inner
     bears = was and not (p.stick_once and state[_BROKEN] > 0)
-    touching = (not p.unilateral) or force >= (-p.stick_N if bears else -1e-13)
+    new[_PULLED] = state[_PULLED] + p.step_s * max(-force, 0.0) if bears and force < 0 else 0.0
+    touching = (not p.unilateral) or force >= (-p.stick_N if bears else -1e-13) or 0 < new[_PULLED] < p.stick_Ns
     new[_BROKEN] = 1.0 if was and not touching else state[_BROKEN]
     if touching:
         new[_CONTACT] = state[_CONTACT] + 1
@@ -273,6 +302,12 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
             force -= p.pull_off_N * math.exp(-gap / p.adhesion_mm)
         elif p.adhesion_form == 5:
             force -= p.pull_off_N / (1 + gap / p.adhesion_mm) ** 2
+        elif new[_ATTACHED] > 0 and p.adhesion_form == 7:
+            share = gap / p.adhesion_mm
+            force -= p.pull_off_N * max(min(share / 0.15, 1.0, (1 - share) / 0.3), 0.0)
+        elif new[_ATTACHED] > 0 and p.adhesion_form == 8:
+            quick = 1 + 10 * max(state[_X] - x, 0.0) / p.step_s  # 1 + v/0.1 mm/s; 101 at 10 mm/s
+            force -= p.pull_off_N * math.sin(0.5 * math.pi * gap / p.adhesion_mm) * (quick / 101) ** 0.15
         elif new[_ATTACHED] > 0 and p.adhesion_form == 6:
             force -= p.pull_off_N * min(4 * gap, (p.adhesion_mm - gap) * 4 / 3) / p.adhesion_mm
         elif new[_ATTACHED] > 0 and p.adhesion_form == 4:
@@ -318,14 +353,14 @@ def run(p, table, c, nu, behind_mm, felt_N, height_mm, gain, rate_factor):
     cell, pad, probe, contact = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, dtype=np.bool_)
     z, new_z, e, k = np.zeros(r), np.zeros(r), np.ones(r), np.ones(r)
     slips, new_slips = np.zeros(_SLIPS), np.zeros(_SLIPS)
-    state, new = np.zeros(10), np.zeros(10)
+    state, new, late, new_late = np.zeros(11), np.zeros(11), np.zeros(1), np.zeros(1)
     state[_X], probe[0], cell[0] = behind_mm[0], behind_mm[0], felt_N[0]
     stiffness = 1.0
     for j in range(1, n):
         if j == 1 or p.rate_form or rate_factor[j] != rate_factor[j - 1]:
             _rates(p, nu, rate_factor[j], state[_S], e, k)
         y = behind_mm[j]
-        x = y if p.frame_form == 0 else y - _deflection(p, cell[j - 1])
+        x = y if p.frame_form == 0 else y - _deflection(p, cell[j - 1], late, new_late)
         low, high = -1e9, 1e9
         x_last = r_last = 0.0
         for turn in range(80):
@@ -333,7 +368,7 @@ def run(p, table, c, nu, behind_mm, felt_N, height_mm, gain, rate_factor):
             total = force + felt_N[j] + _friction(p, slips, x - state[_X], new_slips)
             if p.frame_form == 0:
                 break
-            left = x - y + _deflection(p, total)
+            left = x - y + _deflection(p, total, late, new_late)
             if abs(left) < 1e-10 or high - low < 1e-12:
                 break
             if left > 0:
@@ -349,5 +384,5 @@ def run(p, table, c, nu, behind_mm, felt_N, height_mm, gain, rate_factor):
             if x <= low or x >= high or turn > 30:
                 x = 0.5 * (low + high) if high - low < 1e8 else x
         cell[j], pad[j], probe[j], contact[j] = total, force, x, new[_CONTACT] > 0
-        z[:], state[:], slips[:] = new_z, new, new_slips
+        z[:], state[:], slips[:], late[:] = new_z, new, new_slips, new_late
     return cell, pad, probe, contact

@@ -59,23 +59,26 @@ def _allowed(base: Law, other: Law, share: float, depth_mm: float) -> float:
     return share
 
 
+def hide_law(build: Build, name: str, other: Law, size: float, believed: Law | None = None) -> dict[str, Any]:
+    """Make `other` the true law, and believe the nearest of a family: the one given, or a power or exponential."""
+    believed = believed or (Power(1.0, 0.7), Exponential(1.0, 0.5))[int(build.rng.integers(2))]
+    believed = fitted(believed, other, build.depth_mm)
+    share = _allowed(believed, other, size, build.depth_mm)
+    other = other if share == 1 else Blend(believed, other, share)
+    build.plant.pad = replace(build.plant.pad, law=other)
+    build.believed = replace(build.believed, law=believed)
+    return {"law": name, "share_of_difference": share}
+
+
 @effect("elastic_law", "catalogue", "mooney_rivlin", "tanh", "two_slope", "foam")
 def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     """The true law is another; the believed one is fitted to it. Sizes but 1 lie between (or beyond) the two."""
     rng, depth, force = build.rng, build.depth_mm, build.force_N
     if shape == "catalogue":
         name = str(rng.choice(["exponential", "power"]))
-        other = draw.law(rng, name, depth, force)
-        believed: Law = Power(1.0, 0.7) if name == "exponential" else Exponential(1.0, 0.5)
-    else:
-        other = _other(rng, shape, depth, force)
-        believed = (Power(1.0, 0.7), Exponential(1.0, 0.5))[int(rng.integers(2))]
-    believed = fitted(believed, other, depth)
-    share = _allowed(believed, other, size, depth)
-    other = other if share == 1 else Blend(believed, other, share)
-    build.plant.pad = replace(build.plant.pad, law=other)
-    build.believed = replace(build.believed, law=believed)
-    return {"law": shape if shape != "catalogue" else name, "share_of_difference": share}
+        believed = Power(1.0, 0.7) if name == "exponential" else Exponential(1.0, 0.5)
+        return hide_law(build, name, draw.law(rng, name, depth, force), size, believed)
+    return hide_law(build, shape, _other(rng, shape, depth, force), size)
 
 
 def _stretched(beta: float, rate: float) -> tuple[np.ndarray, np.ndarray]:
