@@ -45,6 +45,8 @@ class Data:
     """Number of the hold, the move or the window, from 0 on."""
     tared: Mask | None = None
     """Entries at which the force was taken for zero (the tare); None: the force's zero is its own."""
+    short: Data | None = None
+    """The stand-in for it, free of hum."""
 
     @property
     def size(self) -> int:
@@ -186,10 +188,11 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     owner = _blocks(
         full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(motion.std_mm, 0.9))
     )
+    short = _averaged(full, owner)
     return Prepared(
         name=m.name,
-        full=full,
-        short=_averaged(full, owner),
+        full=replace(full, short=short),
+        short=short,
         owner=owner,
         at=where,
         kept=inside,
