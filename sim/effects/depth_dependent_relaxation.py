@@ -5,7 +5,7 @@
 - `hyperbolic`: time constants linear in depth: 1/(1 − slope · δ), continued above 10 as the others are below.
 - `free_volume`: e^(slope · δ/(1 + δ/fading)): rates go with e^(−B/f), and the free volume f with depth (M. L. Williams,
   R. F. Landel, J. D. Ferry, J. Am. Chem. Soc. 77, 1955, 3701–3707).
-- `knee`: 1 + slope · δ/(1 + (δ/knee)^4)^¼: linear up to a knee, and even beyond.
+- `knee`: 1 + slope · min(δ, knee): linear up to a knee, and even beyond.
 
 All have the relative slope `slope` at the surface.
 
@@ -54,8 +54,7 @@ def free_volume(dt: float, depth: float, state: State, p: State) -> float:
 def knee(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on the rates; p = (slope, knee)."""
     here = max(depth, 0.0)
-    square = (here / p[1]) ** 2
-    factor = 1.0 + p[0] * here / math.sqrt(math.sqrt(1.0 + square * square))
+    factor = 1.0 + p[0] * min(here, p[1])
     return float(factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0)))
 
 

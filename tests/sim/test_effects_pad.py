@@ -242,6 +242,17 @@ class TestDamage:
             )  # fmt: skip
             assert_allclose(force[-1], K * deepest * math.exp(-0.1 * deepest**2), rtol=1e-9)
 
+    def test_a_pad_that_has_let_go_is_loaded_from_its_own_surface_on(self) -> None:
+        """It has relaxed at 1 mm, and stays sunk for a while: off and on again at once loads next to nothing of it."""
+        pad = Pad(Exponential(K, 0.0), Relaxation((0.99,), (100.0,)), unilateral=True)
+        x = np.concatenate([ramp(1.0, 101, False), np.full(1000, 1.0), ramp(1.0, 11)[10:], ramp(1.0, 11, False)])
+        plant = Cascade(pad, [active("damage", rate=0.2)]).plant()
+        force, elastic = np.array([(plant.step(1e-3, float(p)), plant.elastic_force_N) for p in x]).T
+        assert force[1111] == 0.0
+        assert_allclose(elastic[1100], K * math.exp(-0.2 * 0.996), rtol=1e-6)
+        surface = 0.99 * math.exp(-0.01 * 100 * 0.02)  # it comes up as what is left of the modes lets it
+        assert_allclose(elastic[-1], K * math.exp(-0.2 * (1.992 - surface)), rtol=2e-3)
+
     def test_noise_of_position_does_not_wear_the_pad(self) -> None:
         noise = 5e-4 * np.random.default_rng(4).standard_normal(60000)
         x = 1.0 + noise
@@ -255,7 +266,7 @@ class TestRates:
     def test_relaxation_at_a_depth_runs_on_a_clock_of_its_own(self, form: str) -> None:
         slope, depth = -0.25, 1.5
         factors = {"linear": 0.625, "exponential": math.exp(-0.375), "hyperbolic": 1 / 1.375}
-        factors["knee"] = 1 - 0.375 / 2**0.25  # at the knee
+        factors["knee"] = 0.625  # at the knee
         factor = factors.get(form, math.exp(-0.375 / 1.375))  # with half the slope left at 4 mm
         t = np.linspace(0.0, 3.0, 301)
         force = simulate(SOFT, [active("depth_dependent_relaxation", form, slope=slope)], t, np.full(t.size, depth))
