@@ -180,15 +180,18 @@ def _trapezoids(
     moving: NDArray[np.bool_],
     groups: list[tuple[int, int]],
     reach: float,
-    noise: float,
+    noise: float | Array,
     fitted: Array | None = None,
+    most: int = INSIDE,
 ) -> Moves:
-    """The groups that are trapezoids, within what the samples tell; `fitted`: samples to fit instead of x."""
+    """The groups that are trapezoids, within what the samples tell; `fitted`: samples to fit instead of x. `noise`: of
+    all of them, or of each of the groups, which begin and end at rest then. `most`: samples of a move to look at.
+    """
     rest = [g for g in groups if _from_rest(moving, x, g)]
     if not rest:
         return {}
     starts, ends = _levels(x, moving, rest)
-    moves = _moves(t, x, rest, starts, ends, x if fitted is None else fitted)
+    moves = _moves(t, x, rest, starts, ends, x if fitted is None else fitted, most)
     allowed = np.maximum(4 * noise, SLACK * moves.way)
     told = moves.count >= 2
     if not told.any():
@@ -259,12 +262,14 @@ def _levels(x: Array, moving: NDArray[np.bool_], groups: list[tuple[int, int]]) 
     return start, end
 
 
-def _moves(t: Array, x: Array, groups: list[tuple[int, int]], starts: Array, ends: Array, fitted: Array) -> _Moves:
+def _moves(
+    t: Array, x: Array, groups: list[tuple[int, int]], starts: Array, ends: Array, fitted: Array, most: int
+) -> _Moves:
     picked = []
     for first, last in groups:
         inside = np.arange(first + 1, last)
-        if len(inside) > INSIDE:  # both ends tell the corners
-            inside = inside[np.unique(np.round(np.linspace(0, len(inside) - 1, INSIDE)).astype(np.intp))]
+        if len(inside) > most:  # both ends tell the corners
+            inside = inside[np.unique(np.round(np.linspace(0, len(inside) - 1, most)).astype(np.intp))]
         picked.append(inside)
     width = max(max(len(p) for p in picked), 1)
     m = len(groups)

@@ -12,6 +12,7 @@ from bench.errors import InputError
 from bench.felt_motion import felt, resolution
 from bench.identify.noise import stiffness_along
 from bench.recording.types import Measurement
+from bench.restamp import restamped
 from sim.jit import compiled
 from sim.pad import union
 
@@ -149,6 +150,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     """Grid, noise and stand-in. `good` (m,): force samples that are not channel faults; `between`: with the motion
     between samples rebuilt. Raises InputError where there is next to nothing to work on.
     """
+    m = restamped(m)
     inside = (m.force_time_s >= m.position_time_s[0]) & (m.force_time_s <= m.position_time_s[-1])
     if not inside.all():
         m = replace(m, force_time_s=m.force_time_s[inside], force_N=m.force_N[inside])
