@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from bench.felt_motion import position_noise, smoothed
+from bench.motion_between import planned_moves
 from bench.recording.types import Measurement
 from bench.restamp import restamped
 from tests.bench.diagnose.small import measurement
@@ -58,3 +60,25 @@ def test_two_clocks_are_left_alone() -> None:
     m = measurement(drawn(0, "stamp"))
     apart = Measurement("apart", m.position_time_s, m.position_mm, m.force_time_s + 1e-4, m.force_N)
     assert restamped(apart) is apart
+
+
+def test_moves_between_noisy_rests_are_found() -> None:
+    """Wiggles of a smoothed rest beside a move do not hide that it begins and ends there."""
+    missed = moves = 0
+    for seed in SEEDS:
+        c = draw_case(
+            seed, (), None, protocol="random_steps", rate_hz=500.0, jitter="none", own_clock=False,
+            position_noise_mm=6e-4,
+        )  # fmt: skip
+        m = measurement(c)
+        clean, std = smoothed(m.position_time_s, m.position_mm)
+        noise, left = position_noise(m.position_mm), float(np.median(std))
+        found = planned_moves(m.position_time_s, m.position_mm, clean, noise, left)
+        at = c.truth.motion.breaks_s
+        speed = np.abs(c.truth.motion.velocity(0.5 * (at[1:] + at[:-1])))
+        fast = at[:-1][(speed > 5.0)]
+        known = [(m.position_time_s[a], m.position_time_s[b]) for a, b in found]
+        moves += len(fast)
+        missed += sum(not any(a <= t <= b for a, b in known) for t in fast)
+    assert moves > 100
+    assert missed < 0.03 * moves, (missed, moves)
