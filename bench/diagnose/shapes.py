@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,9 @@ from .refit import Fit, force_at, refit
 
 Array = NDArray[np.float64]
 
-STEPS, STARTS = 8, 6  # of the fit of another shape
+STEPS, STARTS = 8, 12  # of the fit of another shape
+FEW, TRIED = 3, 2  # steps of the best starts
+NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
 WORKERS = 2
 
@@ -108,10 +109,11 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     cause = structure.causes[index]
     shape = narrowed(form, _reach(short, structure))
     told = {p.name: values[index][p.name] for p in shape.parameters if p.name in values[index]}
-    of_shape = replace(shape, parameters=tuple(p for p in shape.parameters if not p.required))
+    every = list(combinations(shape))
+    others = every[:: max(1, len(every) // STARTS)]
     pad = lead.x[: len(structure.pad.coordinates)]
-    best: tuple[float, Structure, Array] | None = None
-    for started in [{}, *islice(combinations(of_shape), STARTS)]:
+    begun: list[tuple[float, Structure, Array]] = []
+    for started in [{}, *others]:
         own = cause_of(cause.effect, shape, told | started)
         joined = replace(structure, causes=(*structure.causes[:index], own, *structure.causes[index + 1 :]))
         x = joined.x(pad, [*values[:index], own.start, *values[index + 1 :]], lead.of_run)
@@ -119,10 +121,13 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
         if not np.isfinite(force).all():
             continue
         e = short.whitened(short.force_N - force)
-        square = float(np.sum(e * e))
-        if best is None or square < best[0]:
-            best = square, joined, x
-    return None if best is None else Member(refit(short, best[1], best[2], STEPS, 1e-6), index)
+        begun.append((float(np.sum(e * e)), joined, x))
+    begun.sort(key=lambda start: start[0])
+    tried = [refit(short, joined, x, FEW, NEARLY) for _, joined, x in begun[:TRIED]]
+    if not tried:
+        return None
+    best = min(tried, key=lambda fit: fit.chi2)
+    return Member(refit(short, best.structure, best.x, STEPS, NEARLY), index)
 
 
 def _reach(short: Data, structure: Structure) -> Reach:

@@ -12,6 +12,7 @@
 - `necking`: a bond that pulls only once it is stretched: from nothing in contact to `pull_off` at `crest` of the range,
   and down to nothing at its end (G. Alfano, M. A. Crisfield, Finite element interface models for delamination, Int. J.
   Numer. Methods Eng. 50, 2001, 1701–1736: traction and separation).
+- `stretching`: a neck that pulls up to `pull_off` as it is stretched, pull_off · sin(π/2 · gap/range), and snaps.
 
 `range` is the gap at which the pull has fallen to 1/e where it ends nowhere, and where it ends otherwise.
 
@@ -72,6 +73,16 @@ def necking(dt: float, gap: float, state: State, p: State) -> float:
     return -p[0] * min(stretched / p[2], (1.0 - stretched) / (1.0 - p[2]))
 
 
+@block
+def stretching(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range); state: whether there is a bond."""
+    if gap >= p[1]:
+        state[0] = 0.0
+    elif gap <= 0.0:
+        state[0] = 1.0
+    return -p[0] * state[0] * math.sin(0.5 * math.pi * gap / p[1])
+
+
 _PULL_OFF = Parameter(
     "pull_off",
     "N",
@@ -118,8 +129,8 @@ EFFECT = Effect(
             parameters=(
                 _PULL_OFF,
                 _RANGE,
-                Parameter("dwell", "s", 1e-3, 100.0, 0.05, "time of contact in which the bond grows"),
-                Parameter("left", "1", 0.0, 1.0, 0.0, "share of the pull that is left when it tears"),
+                Parameter("dwell", "s", 1e-3, 100.0, 0.05, "time of contact in which it grows", starts=(0.005, 0.1)),
+                Parameter("left", "1", 0.0, 1.0, 0.0, "share of the pull left when it tears", starts=(0.0, 0.5)),
             ),
             blocks={"gap": sticking},
             state=(0.0,),
@@ -133,6 +144,14 @@ EFFECT = Effect(
                 Parameter("crest", "1", 0.02, 0.98, 0.6, "share of the range at which it pulls most"),
             ),
             blocks={"gap": necking},
+            state=(0.0,),
+        ),
+        Form(
+            name="stretching",
+            what="pulls after contact alone, the more it is stretched, and snaps",
+            parameters=(_PULL_OFF, _RANGE),
+            sought=False,
+            blocks={"gap": stretching},
             state=(0.0,),
         ),
     ),

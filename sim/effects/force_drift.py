@@ -60,7 +60,7 @@ _RATE = Parameter("rate", "N/s", -100.0, 100.0, 0.002, "rate at the first sample
 
 
 def _time_constant(what: str) -> Parameter:
-    return Parameter("time_constant", "s", 0.05, 1e5, 30.0, what, starts=(3.0, 20.0, 120.0))
+    return Parameter("time_constant", "s", 1.0, 1e5, 30.0, what, starts=(3.0, 20.0, 120.0))
 
 
 EFFECT = Effect(

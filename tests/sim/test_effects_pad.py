@@ -179,6 +179,8 @@ class TestPermanentSet:
             assert_allclose(self.surface("power", deepest, set=0.1, exponent=1.7), 0.1 * deepest**1.7, rtol=1e-9)
             whole = self.surface("power", deepest, set=0.1, exponent=1.7, reach=deepest)
             assert_allclose(whole, 0.1 * deepest, rtol=1e-9)
+            sunk = 0.15 * (1 - math.exp(-0.1 * deepest / 0.15))
+            assert_allclose(self.surface("saturating", deepest, set=0.1, limit=0.15), sunk, rtol=1e-9)
         assert_allclose(self.surface("yielding", 2.0, set=0.1, limit=0.8), 0.12, rtol=1e-9)
         assert_allclose(self.surface("yielding", 0.7, set=0.1, limit=0.8), 0.0, atol=1e-12)
 
@@ -367,6 +369,15 @@ class TestSeparationAndAdhesion:
         force = simulate(LINEAR, [neck], np.arange(x.size) * 1e-3, x)
         gap = np.maximum(-x[2000:], 0.0)
         pull = np.interp(gap, [0.0, 0.05, 0.2], [0.0, 0.3, 0.0])
+        assert_allclose(force[:1000], 0.0, atol=1e-12)
+        assert_allclose(force[2000:], K * np.maximum(x[2000:], 0.0) - pull, atol=1e-9)
+
+    def test_a_neck_that_snaps(self) -> None:
+        x = ramp(2.0, 2001) - 1.0005
+        neck = active("adhesion", "stretching", pull_off=0.3, range=0.2)
+        force = simulate(LINEAR, [neck], np.arange(x.size) * 1e-3, x)
+        gap = np.maximum(-x[2000:], 0.0)
+        pull = np.where(gap < 0.2, 0.3 * np.sin(0.5 * np.pi * gap / 0.2), 0.0)
         assert_allclose(force[:1000], 0.0, atol=1e-12)
         assert_allclose(force[2000:], K * np.maximum(x[2000:], 0.0) - pull, atol=1e-9)
 
