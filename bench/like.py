@@ -24,6 +24,7 @@ from bench.diagnose.diagnose import NEAR
 from bench.errors import InputError
 from bench.felt_motion import felt
 from bench.recording.types import Measurement
+from bench.restamp import restamped
 from sim.model import Model
 
 Array = NDArray[np.float64]
@@ -97,20 +98,24 @@ def likeness(model: Model, measurement: Measurement) -> Likeness:
     return replace(judged, rmse_as_reported_N=as_reported.rmse_N)
 
 
-def _paths(measurement: Measurement) -> Iterator[tuple[Array, Array]]:
-    yield measurement.position_time_s, measurement.position_mm
-    motion = felt(measurement.position_time_s, measurement.position_mm)
+def _paths(measurement: Measurement) -> Iterator[tuple[Array, Array, Array]]:
+    """Stamps and positions of the motion, and stamps of the force: as reported, and as felt."""
+    yield measurement.position_time_s, measurement.position_mm, measurement.force_time_s
+    told = restamped(measurement)
+    motion = felt(told.position_time_s, told.position_mm)
     if not np.array_equal(motion.position_mm, measurement.position_mm):
-        yield motion.time_s, motion.position_mm
+        yield motion.time_s, motion.position_mm, told.force_time_s
 
 
-def _along(model: Model, measurement: Measurement, time_s: Array, position_mm: Array, flagged: Mask) -> Likeness:
-    """On one path, the surface where it serves the model best."""
+def _along(
+    model: Model, measurement: Measurement, time_s: Array, position_mm: Array, stamp_s: Array, flagged: Mask
+) -> Likeness:
+    """On one path, the surface where it serves the model best. `stamp_s` (m,): of the forces."""
     counted = measurement.counted() & ~flagged
     measured = measurement.force_N[counted]
 
     def force(moved_mm: float) -> Array:
-        return model.simulate_at(time_s, position_mm + moved_mm, measurement.force_time_s)
+        return model.simulate_at(time_s, position_mm + moved_mm, stamp_s)
 
     def square(moved_mm: float) -> float:
         return float(np.sum((measured - force(moved_mm)[counted]) ** 2))

@@ -79,21 +79,29 @@ def planned_moves(time_s: Array, position_mm: Array, clean_mm: Array, noise_mm: 
     reach = float(np.ptp(clean_mm))
     if len(time_s) < 5 or not reach > 0:
         return {}
-    moving, _ = _moving(clean_mm, reach, left_mm)
-    groups = [(a, b) for a, b in _grouped(moving, moving) if b - a >= LEAST]
-    if not groups:
-        return {}
-    found = _trapezoids(time_s, clean_mm, moving, groups, reach, noise_mm, position_mm)
+    out: Moves = {}
+    for quiet_mm in (left_mm, noise_mm):  # what is left beside a move may hide that it begins at rest
+        moving, _ = _moving(clean_mm, reach, quiet_mm)
+        groups = [(a, b) for a, b in _grouped(moving, moving) if b - a >= LEAST]
+        if groups:
+            found = _trapezoids(time_s, clean_mm, moving, groups, reach, noise_mm, position_mm)
+            told = _told(found, time_s, position_mm, noise_mm)
+            out |= {k: v for k, v in told.items() if not any(k[0] < o[1] and o[0] < k[1] for o in out)}
+    return _apart(out)
+
+
+def _told(found: Moves, time_s: Array, position_mm: Array, noise_mm: float) -> Moves:
+    """Those that the noisy positions agree with, with the slow beginnings and ends that hide in the noise."""
     out = {}
     for (first, last), move in found.items():
-        corners = move.corners_s()  # slow beginnings and ends hide in the noise
+        corners = move.corners_s()
         a = min(first, max(int(np.searchsorted(time_s, corners[0])) - 1, 0))
         b = max(last, min(int(np.searchsorted(time_s, corners[-1])) + 1, len(time_s) - 1))
         off = (position_mm - move.position(time_s))[a : b + 1] / noise_mm
         n = len(off)
         if n >= LEAST and float(np.sum(off**2)) <= 1.2 * n + AGREED * np.sqrt(2.0 * n):
             out[a, b] = move
-    return _apart(out)
+    return out
 
 
 def _apart(moves: Moves) -> Moves:
@@ -180,15 +188,17 @@ def _trapezoids(
     moving: NDArray[np.bool_],
     groups: list[tuple[int, int]],
     reach: float,
-    noise: float,
+    noise: float | Array,
     fitted: Array | None = None,
+    most: int = INSIDE,
 ) -> Moves:
-    """The groups that are trapezoids, within what the samples tell; `fitted`: samples to fit instead of x."""
+    """The groups that are trapezoids, within what the samples tell; `fitted`: samples to fit instead of x, `most` of a
+    move. `noise`: of all of them, or of each of the groups, which begin and end at rest then."""
     rest = [g for g in groups if _from_rest(moving, x, g)]
     if not rest:
         return {}
     starts, ends = _levels(x, moving, rest)
-    moves = _moves(t, x, rest, starts, ends, x if fitted is None else fitted)
+    moves = _moves(t, x, rest, starts, ends, x if fitted is None else fitted, most)
     allowed = np.maximum(4 * noise, SLACK * moves.way)
     told = moves.count >= 2
     if not told.any():
@@ -259,12 +269,14 @@ def _levels(x: Array, moving: NDArray[np.bool_], groups: list[tuple[int, int]]) 
     return start, end
 
 
-def _moves(t: Array, x: Array, groups: list[tuple[int, int]], starts: Array, ends: Array, fitted: Array) -> _Moves:
+def _moves(
+    t: Array, x: Array, groups: list[tuple[int, int]], starts: Array, ends: Array, fitted: Array, most: int
+) -> _Moves:
     picked = []
     for first, last in groups:
         inside = np.arange(first + 1, last)
-        if len(inside) > INSIDE:  # both ends tell the corners
-            inside = inside[np.unique(np.round(np.linspace(0, len(inside) - 1, INSIDE)).astype(np.intp))]
+        if len(inside) > most:  # both ends tell the corners
+            inside = inside[np.unique(np.round(np.linspace(0, len(inside) - 1, most)).astype(np.intp))]
         picked.append(inside)
     width = max(max(len(p) for p in picked), 1)
     m = len(groups)

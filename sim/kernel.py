@@ -92,41 +92,37 @@ def product(program: Ints, params: Doubles, state: Doubles, shift: int, place: i
     return result
 
 
-@compiled(
-    "float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64, float64)"
-)
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64)")
 def surface_force(
-    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, s: float, A: float, B: float, factor: float
+    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, s: float, A: float, B: float
 ) -> float:
-    """Force of the pad were its surface at depth `s`: A + B F^e(s) + contact(s), contact blocks on a scratch copy."""
+    """Force of the pad were its surface at depth `s`: A + B F^e(s) + contact(s), all blocks on a scratch copy."""
     inner, scratch = program[INNER], program[SCRATCH]
     for k in range(program[INNER_SIZE]):
         state[scratch + k] = state[inner + shift + k]
     aside = scratch - inner
-    Fe = factor * chain(program, params, state, aside, LAW, dt, s)
+    Fe = product(program, params, state, aside, ELASTIC, dt, s) * chain(program, params, state, aside, LAW, dt, s)
     return A + B * Fe + total(program, params, state, aside, CONTACT, dt, s)
 
 
-@compiled(
-    "float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64, float64)"
-)
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64)")
 def free_surface(
-    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, low: float, A: float, B: float, factor: float
+    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, low: float, A: float, B: float
 ) -> float:
     """Depth at which a pad that has let go carries no force; at depth `low` the force would be negative."""
     low = max(low, 0.0)  # nothing of the pad's changes above its surface
-    f_low = surface_force(program, params, state, shift, dt, low, A, B, factor)
+    f_low = surface_force(program, params, state, shift, dt, low, A, B)
     high = max(low, state[program[INNER] + shift + SURFACE])
     width = max(high - low, 1e-6)
     high = low + width
-    f_high = surface_force(program, params, state, shift, dt, high, A, B, factor)
+    f_high = surface_force(program, params, state, shift, dt, high, A, B)
     for _ in range(60):
         if not f_high < 0.0:
             break
         low, f_low = high, f_high
         width *= 2.0
         high += width
-        f_high = surface_force(program, params, state, shift, dt, high, A, B, factor)
+        f_high = surface_force(program, params, state, shift, dt, high, A, B)
     s = high
     side = 0
     for _ in range(200):
@@ -135,7 +131,7 @@ def free_surface(
             s = 0.5 * (low + high)
         if not low < s < high:
             break
-        f = surface_force(program, params, state, shift, dt, s, A, B, factor)
+        f = surface_force(program, params, state, shift, dt, s, A, B)
         if f < 0.0:
             low, f_low = s, f
             if side == -1:  # Illinois: the end that stays loses half its weight
@@ -158,8 +154,6 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
     pad = program[INNER] + shift
     relax, cache = program[RELAX], program[CACHE]
     depth = chain(program, params, state, shift, DEPTH, dt, y)
-    factor = product(program, params, state, shift, ELASTIC, dt, depth)
-    Fe = factor * chain(program, params, state, shift, LAW, dt, depth)
     scaled = dt * product(program, params, state, shift, RATE, dt, depth)
     if state[cache] != scaled:  # decay and gain of the modes are kept while the step stays the same
         state[cache] = scaled
@@ -175,27 +169,27 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
         c, gain = params[relax + 1 + i], state[cache + 1 + r + i]
         A += c * (state[cache + 1 + i] * state[pad + W + i] - gain * old)
         B += c * gain
-    F = A + B * Fe
     surface = max(depth, 0.0)
     plain = program[STARTS + CONTACT] == program[STARTS + CONTACT + 1]
     simple = plain and program[STARTS + GAP] == program[STARTS + GAP + 1]
-    if program[UNILATERAL] == 0:
-        F += total(program, params, state, shift, CONTACT, dt, depth)
-    elif simple:
-        if F < 0.0:
+    lasting = program[STARTS + ELASTIC] == program[STARTS + ELASTIC + 1]  # nothing remembers where the surface was
+    off = False
+    if program[UNILATERAL] != 0 and not (simple and lasting):
+        off = surface_force(program, params, state, shift, dt, depth, A, B) < 0.0
+        if off:
+            surface = free_surface(program, params, state, shift, dt, depth, A, B)
+    felt = surface if off else depth
+    Fe = product(program, params, state, shift, ELASTIC, dt, felt) * chain(program, params, state, shift, LAW, dt, felt)
+    F = A + B * Fe
+    if program[UNILATERAL] != 0 and simple and lasting:
+        off = F < 0.0
+    own = total(program, params, state, shift, CONTACT, dt, felt)
+    if off:
+        if plain:
             Fe = -A / B if B > 0.0 else 0.0
-            F = 0.0
+        F = 0.0
     else:
-        if surface_force(program, params, state, shift, dt, depth, A, B, factor) < 0.0:
-            surface = free_surface(program, params, state, shift, dt, depth, A, B, factor)
-            if plain:
-                Fe = -A / B if B > 0.0 else 0.0
-            else:
-                Fe = factor * chain(program, params, state, shift, LAW, dt, surface)
-            total(program, params, state, shift, CONTACT, dt, surface)
-            F = 0.0
-        else:
-            F += total(program, params, state, shift, CONTACT, dt, depth)
+        F += own
     for i in range(r):
         w = state[pad + W + i]
         state[pad + W + i] = state[cache + 1 + i] * w + state[cache + 1 + r + i] * (Fe - old)

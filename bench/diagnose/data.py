@@ -12,6 +12,7 @@ from bench.errors import InputError
 from bench.felt_motion import felt, resolution
 from bench.identify.noise import stiffness_along
 from bench.recording.types import Measurement
+from bench.restamp import restamped
 from sim.jit import compiled
 from sim.pad import union
 
@@ -49,6 +50,8 @@ class Data:
     colour: Colour = Colour()
     """Of the noise, from force sample to force sample, which are `sample_s` apart, as far as the cost knows of it."""
     sample_s: float = 1.0
+    short: Data | None = None
+    """The stand-in for it, free of hum."""
 
     @property
     def size(self) -> int:
@@ -146,8 +149,8 @@ class Prepared:
         """With a cost that knows the noise's colour. It is for fits that leave little beside the noise: it makes much
         of what changes fast, and so of what a model that is far off leaves there.
         """
-        colour = self.colour
-        return replace(self, full=replace(self.full, colour=colour), short=replace(self.short, colour=colour))
+        short = replace(self.short, colour=self.colour)
+        return replace(self, full=replace(self.full, colour=self.colour, short=short), short=short)
 
     @property
     def floor_N(self) -> float:
@@ -170,6 +173,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     """Grid, noise and stand-in. `good` (m,): force samples that are not channel faults; `between`: with the motion
     between samples rebuilt. Raises InputError where there is next to nothing to work on.
     """
+    m = restamped(m)
     inside = (m.force_time_s >= m.position_time_s[0]) & (m.force_time_s <= m.position_time_s[-1])
     if not inside.all():
         m = replace(m, force_time_s=m.force_time_s[inside], force_N=m.force_N[inside])
@@ -209,10 +213,11 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     owner = _blocks(
         full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(motion.std_mm, 0.9))
     )
+    short = _averaged(full, owner)
     return Prepared(
         name=m.name,
-        full=full,
-        short=_averaged(full, owner),
+        full=replace(full, short=short),
+        short=short,
         owner=owner,
         at=where,
         kept=inside,

@@ -1,5 +1,5 @@
-"""Standard errors of a diagnosis's numbers: they hold where the noise is coloured or uneven, and where a shape of the
-family leaves something that no shape of it explains."""
+"""Standard errors of a diagnosis's numbers: they hold where the noise is coloured or uneven, where a shape of the
+family leaves something that no shape of it explains, and where several shapes serve as well."""
 
 from __future__ import annotations
 
@@ -12,17 +12,24 @@ from bench.identify.uncertainty import sandwich
 
 from .data import Data
 from .refit import Fit, errors, jacobian
+from .shapes import families, scores, stand_in
 
 Array = NDArray[np.float64]
 
+UNKNOWN = 1.0  # variance of a logarithm with which nothing in the data moves
+
 
 def covariance(data: Data, fit: Fit) -> Array:
-    """Of x (P, P), 0 at bounds, in units of the noise (`bench.identify.uncertainty.sandwich`). `fit`: at its minimum on
-    `data`.
-    """
-    structure, x = fit.structure, fit.x
-    if not len(x):
+    """Of x (P, P), 0 at bounds, in units of the noise. `fit`: at its minimum on `data`."""
+    if not len(fit.x):
         return np.zeros((0, 0))
+    own = of_the_noise(data, fit)
+    return own + np.diag(_of_the_shapes(data, fit, np.diag(own).copy()))
+
+
+def of_the_noise(data: Data, fit: Fit) -> Array:
+    """Covariance of x (P, P) with the shapes of the causes as they are (`bench.identify.uncertainty.sandwich`)."""
+    structure, x = fit.structure, fit.x
     counted = data.weight > 0
     J = jacobian(data, structure, x)[counted]
     J[~np.isfinite(J)] = 0.0
@@ -33,3 +40,37 @@ def covariance(data: Data, fit: Fit) -> Array:
         return np.zeros_like(prior)
     square = max(float(np.mean(e * e)), 1.0)
     return sandwich([e], [J], here.covariance(), square * prior, here.free).covariance
+
+
+def _of_the_shapes(data: Data, fit: Fit, own: Array) -> Array:
+    """What the choice among shapes that the data cannot tell apart adds to the variances of x (P,).
+
+    Each shape of a cause's family weighs as its χ² tells it (K. P. Burnham, D. R. Anderson, Model Selection and
+    Multimodel Inference, 2nd ed., Springer, 2002, section 4.3, with Schwarz's weights).
+    """
+    out = np.zeros(len(fit.x))
+    short, lead, kept = stand_in(data, fit)
+    every = fit.structure.values(fit.x)
+    for place, members in zip(kept, families(short, lead, range(len(kept))), strict=True):
+        weight = _weights(scores(short, members))
+        leading, at = members[0].variances, fit.structure.of_cause(place)
+        for position, p in zip(range(at.start, at.stop), fit.structure.causes[place].fitted, strict=True):
+            c = fit.structure.coordinates[position]
+            if not p.required:
+                continue
+            if own[position] == 0.0 and c.logarithmic and c.lower < fit.x[position] < c.upper:
+                out[position] = UNKNOWN
+                continue
+            wider = max(own[position] / max(leading[p.name], 1e-300), 1.0) if own[position] > 0 else 1.0
+            here = every[place][p.name]
+            for w, m in zip(weight[1:], members[1:], strict=True):
+                there = m.values[p.name]
+                away = np.log(max(there, 1e-300) / here) if c.logarithmic else (there - here) / c.unit
+                out[position] += w * float(away**2 + max(wider * m.variances[p.name] - own[position], 0.0))
+    return out
+
+
+def _weights(score: Array) -> Array:
+    """How much each shape counts."""
+    weight = np.exp(-0.5 * (score - score.min()))
+    return np.asarray(weight / weight.sum())

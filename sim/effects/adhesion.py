@@ -3,12 +3,18 @@
 - `exponential`: −pull_off · e^(−gap/range); the same on the way in and out. In contact it is a constant pull, as in
   the DMT theory (B. V. Derjaguin, V. M. Muller, Yu. P. Toporov, J. Colloid Interface Sci. 53, 1975, 314–326).
 - `linear`: −pull_off · (1 − gap/range) up to the range.
-- `van_der_waals`: −pull_off/(1 + gap/range)², the attraction of a sphere by a flat (J. N. Israelachvili, Intermolecular
-  and Surface Forces, 3rd ed., Academic Press, 2011).
-- `sticking`: hysteretic. A bond grows in contact within `dwell` s, stretches linearly over the range, and is gone
-  beyond: it pulls on the way out alone. Pull-off after contact, and a neck that snaps, are the marks of the JKR theory
-  (K. L. Johnson, K. Kendall, A. D. Roberts, Surface energy and the contact of elastic solids, Proc. R. Soc. Lond. A
-  324, 1971, 301–313).
+- `van_der_waals`: −pull_off/(1 + gap/z)², the attraction of a sphere by a flat (J. N. Israelachvili, Intermolecular
+  and Surface Forces, 3rd ed., Academic Press, 2011), with z = range/(√e − 1).
+- `sticking`: hysteretic. A bond grows in contact within `dwell` s, stretches over the range, where a share of `left`
+  still pulls, and is gone beyond: it pulls on the way out alone. Pull-off after contact, and a neck that snaps, are the
+  marks of the JKR theory (K. L. Johnson, K. Kendall, A. D. Roberts, Surface energy and the contact of elastic solids,
+  Proc. R. Soc. Lond. A 324, 1971, 301–313).
+- `necking`: a bond that pulls only once it is stretched: from nothing in contact to `pull_off` at `crest` of the range,
+  and down to nothing at its end (G. Alfano, M. A. Crisfield, Finite element interface models for delamination, Int. J.
+  Numer. Methods Eng. 50, 2001, 1701–1736: traction and separation).
+- `stretching`: a neck that pulls up to `pull_off` as it is stretched, pull_off · sin(π/2 · gap/range), and snaps.
+
+`range` is the gap at which the pull has fallen to 1/e where it ends nowhere, and where it ends otherwise.
 
 The gap is to the surface where it is, sunk as it may be by relaxation.
 """
@@ -20,6 +26,7 @@ import math
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
+_ROOT = math.expm1(0.5)
 _NEAR = 0.02
 """Share of the range within which a bond grows: not 0, so that the force has no jump at touch."""
 
@@ -39,18 +46,41 @@ def linear(dt: float, gap: float, state: State, p: State) -> float:
 @block
 def van_der_waals(dt: float, gap: float, state: State, p: State) -> float:
     """Force in N; p = (pull_off, range)."""
-    near = 1.0 / (1.0 + gap / p[1])
+    near = 1.0 / (1.0 + gap / p[1] * _ROOT)
     return -p[0] * near * near
 
 
 @block
 def sticking(dt: float, gap: float, state: State, p: State) -> float:
-    """Force in N; p = (pull_off, range, dwell); state: the share of the bond that has grown."""
+    """Force in N; p = (pull_off, range, dwell, left); state: the share of the bond that has grown."""
     if gap >= p[1]:
         state[0] = 0.0
         return 0.0
     state[0] -= (1.0 - state[0]) * math.expm1(-dt / p[2] * math.exp(-gap / (_NEAR * p[1])))
-    return -p[0] * state[0] * (1.0 - gap / p[1])
+    return -p[0] * state[0] * (1.0 - (1.0 - p[3]) * gap / p[1])
+
+
+@block
+def necking(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range, crest); state: whether there is a bond."""
+    if gap >= p[1]:
+        state[0] = 0.0
+    elif gap <= 0.0:
+        state[0] = 1.0
+    if state[0] == 0.0:
+        return 0.0
+    stretched = gap / p[1]
+    return -p[0] * min(stretched / p[2], (1.0 - stretched) / (1.0 - p[2]))
+
+
+@block
+def stretching(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range); state: whether there is a bond."""
+    if gap >= p[1]:
+        state[0] = 0.0
+    elif gap <= 0.0:
+        state[0] = 1.0
+    return -p[0] * state[0] * math.sin(0.5 * math.pi * gap / p[1])
 
 
 _PULL_OFF = Parameter(
@@ -99,9 +129,29 @@ EFFECT = Effect(
             parameters=(
                 _PULL_OFF,
                 _RANGE,
-                Parameter("dwell", "s", 1e-3, 100.0, 0.05, "time of contact in which the bond grows"),
+                Parameter("dwell", "s", 1e-3, 100.0, 0.05, "time of contact in which it grows", starts=(0.005, 0.1)),
+                Parameter("left", "1", 0.0, 1.0, 0.0, "share of the pull left when it tears", starts=(0.0, 0.5)),
             ),
             blocks={"gap": sticking},
+            state=(0.0,),
+        ),
+        Form(
+            name="necking",
+            what="pulls after contact alone, and most when it is stretched",
+            parameters=(
+                _PULL_OFF,
+                _RANGE,
+                Parameter("crest", "1", 0.02, 0.98, 0.6, "share of the range at which it pulls most"),
+            ),
+            blocks={"gap": necking},
+            state=(0.0,),
+        ),
+        Form(
+            name="stretching",
+            what="pulls after contact alone, the more it is stretched, and snaps",
+            parameters=(_PULL_OFF, _RANGE),
+            sought=False,
+            blocks={"gap": stretching},
             state=(0.0,),
         ),
     ),

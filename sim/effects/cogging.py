@@ -2,6 +2,9 @@
 
 - `sine`: amplitude · sin(2π y/period + phase).
 - `harmonics`: with a second harmonic, ratio · amplitude.
+- `swelling`: the sine grows along the way, as towards the end of the magnets: amplitude · (1 + growth (y − at_depth)).
+- `trailing`: the sine of a place that is dragged along, as iron's field is behind the magnets': the middle of a play of
+  the full width `trail`.
 
 Reference: J. F. Gieras, Z. J. Piech, B. Z. Tomczuk, Linear Synchronous Motors: Transportation and Automation Systems,
 2nd ed., CRC Press, 2012 (cogging and detent force).
@@ -26,6 +29,22 @@ def harmonics(dt: float, y: float, state: State, p: State) -> float:
     """Force in N; p = (amplitude, period, phase, ratio, second_phase)."""
     angle = 2.0 * math.pi * y / p[1]
     return p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(2.0 * angle + p[4]))
+
+
+@block
+def swelling(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, growth, at_depth)."""
+    return p[0] * (1.0 + p[3] * (y - p[4])) * math.sin(2.0 * math.pi * y / p[1] + p[2])
+
+
+@block
+def trailing(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, trail); state: started, place dragged along."""
+    if state[0] == 0.0:
+        state[0] = 1.0
+        state[1] = y
+    state[1] = min(max(state[1], y - 0.5 * p[3]), y + 0.5 * p[3])
+    return p[0] * math.sin(2.0 * math.pi * state[1] / p[1] + p[2])
 
 
 def _phase(name: str, what: str) -> Parameter:
@@ -78,6 +97,30 @@ EFFECT = Effect(
                 _phase("second_phase", "phase of the second harmonic at position 0"),
             ),
             blocks={"probe": harmonics},
+        ),
+        Form(
+            name="swelling",
+            what="a sine that grows along the way",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                _phase("phase", "phase at position 0"),
+                Parameter("growth", "1/mm", -5.0, 5.0, 0.0, "relative growth per mm", starts=(-0.2, 0.2)),
+                Parameter("at_depth", "mm", 1e-3, 100.0, 1.0, "depth at which the amplitude holds", fixed=True),
+            ),
+            blocks={"probe": swelling},
+        ),
+        Form(
+            name="trailing",
+            what="a sine that trails behind the motion",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                _phase("phase", "phase at position 0"),
+                Parameter("trail", "mm", 0.0, 5.0, 0.1, "full width of the play between the two ways"),
+            ),
+            blocks={"probe": trailing},
+            state=(0.0, 0.0),
         ),
     ),
 )

@@ -3,11 +3,15 @@
 Travel is the sum of all depth gained while loading. Positions come with noise, which would add up: a gain counts once
 it exceeds a dead band (`dead_band`, a choice and not fitted).
 
-- `exponential`: floor + (1 − floor) e^(−rate · travel).
+- `exponential`: floor + (1 − floor) e^(−rate · travel/(1 − floor)).
 - `hyperbolic`: 1/(1 + rate · travel), which slows down.
 - `linear`: 1 − rate · travel, down to 0.02.
-- `energy`: exponential in Σ Δ(δ^(n+1))/(n+1), the work of a spring F ∝ δ^n: deep travel counts more. `rate` is per mm
-  of travel at 1 mm of depth.
+- `power`: (1 + k rate · travel)^(−1/k): between linear (k = −1), exponential (0) and hyperbolic (1), and beyond both:
+  Kachanov's law, which ends in rupture, has k = −3 or so.
+- `energy`: as exponential, in the travel weighed by (n + 1) (δ/reach)^n, as the work of a spring F ∝ δ^n: deep travel
+  counts more, and a stroke down to `reach` as much as elsewhere.
+
+`rate` is what a mm of travel takes at first, of the stiffness.
 
 Reference: J. Lemaitre, A Course on Damage Mechanics, 2nd ed., Springer, 1996
 (accumulated strain and energy as measures).
@@ -33,7 +37,23 @@ def exponential(dt: float, depth: float, state: State, p: State) -> float:
         state[_TRAVEL] += gained
         state[_LAST] += gained
     state[_LAST] = min(state[_LAST], here)
-    return p[1] + (1.0 - p[1]) * math.exp(-p[0] * state[_TRAVEL])
+    return p[1] + (1.0 - p[1]) * math.exp(-p[0] * state[_TRAVEL] / (1.0 - p[1]))
+
+
+@block
+def power(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, power, dead_band)."""
+    here = max(depth, 0.0)
+    gained = here - p[2] - state[_LAST]
+    if gained > 0.0:
+        state[_TRAVEL] += gained
+        state[_LAST] += gained
+    state[_LAST] = min(state[_LAST], here)
+    lost = p[0] * state[_TRAVEL]
+    if abs(p[1]) < 1e-6:
+        return max(_LEAST, math.exp(-lost))
+    left = max(1.0 + p[1] * lost, 1e-9)
+    return max(_LEAST, math.exp(-math.log(left) / p[1]))
 
 
 @block
@@ -62,15 +82,15 @@ def linear(dt: float, depth: float, state: State, p: State) -> float:
 
 @block
 def energy(dt: float, depth: float, state: State, p: State) -> float:
-    """Factor on F^e; p = (rate, exponent, floor, dead_band)."""
+    """Factor on F^e; p = (rate, exponent, floor, reach, dead_band)."""
     here = max(depth, 0.0)
-    gained = here - p[3] - state[_LAST]
+    gained = here - p[4] - state[_LAST]
     if gained > 0.0:
         n = p[1] + 1.0
-        state[_TRAVEL] += ((state[_LAST] + gained) ** n - state[_LAST] ** n) / n
+        state[_TRAVEL] += p[3] * (((state[_LAST] + gained) / p[3]) ** n - (state[_LAST] / p[3]) ** n)
         state[_LAST] += gained
     state[_LAST] = min(state[_LAST], here)
-    return p[2] + (1.0 - p[2]) * math.exp(-p[0] * state[_TRAVEL])
+    return p[2] + (1.0 - p[2]) * math.exp(-p[0] * state[_TRAVEL] / (1.0 - p[2]))
 
 
 _RATE = Parameter(
@@ -79,7 +99,7 @@ _RATE = Parameter(
     0.0,
     10.0,
     0.01,
-    "relative loss of stiffness per mm of loading travel",
+    "relative loss of stiffness per mm of loading travel, at first",
     required=True,
     amplitude=True,
     starts=(0.003, 0.03),
@@ -105,6 +125,7 @@ EFFECT = Effect(
             name="hyperbolic",
             what="ever slower with loading travel",
             parameters=(_RATE, _DEAD_BAND),
+            sought=False,
             blocks={"elastic": hyperbolic},
             state=(0.0, 0.0),
         ),
@@ -112,7 +133,21 @@ EFFECT = Effect(
             name="linear",
             what="in proportion to loading travel",
             parameters=(_RATE, _DEAD_BAND),
+            sought=False,
             blocks={"elastic": linear},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="power",
+            what="with a power of loading travel",
+            parameters=(
+                _RATE,
+                Parameter(
+                    "power", "1", -4.0, 12.0, 1.0, "0: exponential, 1: hyperbolic, -1: linear", starts=(-1.0, 1.0)
+                ),
+                _DEAD_BAND,
+            ),
+            blocks={"elastic": power},
             state=(0.0, 0.0),
         ),
         Form(
@@ -122,6 +157,7 @@ EFFECT = Effect(
                 _RATE,
                 Parameter("exponent", "1", 0.0, 5.0, 1.0, "power of depth that weights the travel", starts=(1.0, 2.0)),
                 _FLOOR,
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth of a stroke on which `rate` is the mean", fixed=True),
                 _DEAD_BAND,
             ),
             blocks={"elastic": energy},

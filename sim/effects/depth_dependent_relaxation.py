@@ -5,6 +5,7 @@
 - `hyperbolic`: time constants linear in depth: 1/(1 − slope · δ), continued above 10 as the others are below.
 - `free_volume`: e^(slope · δ/(1 + δ/fading)): rates go with e^(−B/f), and the free volume f with depth (M. L. Williams,
   R. F. Landel, J. D. Ferry, J. Am. Chem. Soc. 77, 1955, 3701–3707).
+- `knee`: 1 + slope · min(δ, knee): linear up to a knee, and even beyond.
 
 All have the relative slope `slope` at the surface.
 
@@ -49,6 +50,14 @@ def free_volume(dt: float, depth: float, state: State, p: State) -> float:
     return math.exp(min(max(p[0] * here / (1.0 + here / p[1]), -50.0), 50.0))
 
 
+@block
+def knee(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on the rates; p = (slope, knee)."""
+    here = max(depth, 0.0)
+    factor = 1.0 + p[0] * min(here, p[1])
+    return float(factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0)))
+
+
 _SLOPE = Parameter(
     "slope",
     "1/mm",
@@ -84,6 +93,18 @@ EFFECT = Effect(
                 Parameter("fading", "mm", 0.1, 1e3, 4.0, "depth at which half the slope is left", starts=(1.0, 4.0)),
             ),
             blocks={"rate": free_volume},
+        ),
+        Form(
+            name="knee",
+            what="rates linear in depth up to a knee",
+            parameters=(
+                _SLOPE,
+                Parameter(
+                    "knee", "mm", 0.1, 1e3, 1.5, "depth from which the rates stay as they are", starts=(0.7, 2.0)
+                ),
+            ),
+            sought=False,
+            blocks={"rate": knee},
         ),
     ),
 )

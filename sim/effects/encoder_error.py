@@ -4,6 +4,8 @@
 - `harmonics`: with a second harmonic, ratio · amplitude. Unequal offsets of the two quadrature signals make the first
   harmonic, unequal gains and a phase other than 90° the second (P. L. M. Heydemann, Determination and correction of
   quadrature fringe measurement errors in interferometers, Appl. Opt. 20, 1981, 3382–3384).
+- `fading`: the sine fades or grows along the way, where the head is not parallel to its scale: amplitude ·
+  (1 + growth (true − at_depth)), within 0 and twice the amplitude.
 
 A reported position must rise with the true one; an error so steep that it would not is taken as the steepest that does.
 """
@@ -30,6 +32,20 @@ def harmonics(dt: float, x: float, state: State, p: State) -> float:
     """Reported position; p = (amplitude, wave number, phase, ratio, second phase)."""
     angle = p[1] * x
     return x + p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(2.0 * angle + p[4]))
+
+
+@block
+def fading(dt: float, x: float, state: State, p: State) -> float:
+    """Reported position; p = (amplitude, wave number, phase, growth, at_depth)."""
+    size = min(max(1.0 + p[3] * (x - p[4]), 0.0), 2.0)
+    return x + p[0] * size * math.sin(p[1] * x + p[2])
+
+
+def _packed_fading(values: Mapping[str, float]) -> tuple[float, ...]:
+    wave_number = 2.0 * math.pi / values["period"]
+    growth = values["growth"]
+    amplitude = min(values["amplitude"], _STEEPEST / (2.0 * wave_number + abs(growth)))
+    return (amplitude, wave_number, values["phase"], growth, values["at_depth"])
 
 
 def _packed(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -91,6 +107,19 @@ EFFECT = Effect(
             ),
             blocks={"report": harmonics},
             pack=_packed,
+        ),
+        Form(
+            name="fading",
+            what="a sine that fades or grows along the way",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                _phase("phase", "phase at position 0"),
+                Parameter("growth", "1/mm", -5.0, 5.0, 0.0, "relative growth per mm", starts=(-0.2, 0.2)),
+                Parameter("at_depth", "mm", 1e-3, 100.0, 1.0, "depth at which the amplitude holds", fixed=True),
+            ),
+            blocks={"report": fading},
+            pack=_packed_fading,
         ),
     ),
 )

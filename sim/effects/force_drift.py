@@ -7,6 +7,7 @@ first sample in all forms.
 - `settling`: rate · τ (1 − e^(−t/τ)), one thermal time constant.
 - `root`: rate · 2τ (√(1 + t/τ) − 1), as heat that diffuses in.
 - `logarithmic`: rate · τ ln(1 + t/τ), as creep of glue and gauge.
+- `turning`: rate · (2τ/π) sin(πt/2τ), as a room that warms and cools: it turns at τ.
 
 Reference: OIML R 60, Metrological regulation for load cells (creep, and temperature effect on the dead load output).
 """
@@ -47,11 +48,19 @@ def logarithmic(dt: float, force: float, state: State, p: State) -> float:
     return force + p[0] * p[1] * math.log1p(state[0] / p[1])
 
 
+@block
+def turning(dt: float, force: float, state: State, p: State) -> float:
+    """Sine of time; p = (rate, time_constant)."""
+    state[0] += dt
+    slow = 0.5 * math.pi / p[1]
+    return force + p[0] / slow * math.sin(slow * state[0])
+
+
 _RATE = Parameter("rate", "N/s", -100.0, 100.0, 0.002, "rate at the first sample", required=True, amplitude=True)
 
 
 def _time_constant(what: str) -> Parameter:
-    return Parameter("time_constant", "s", 0.05, 1e5, 30.0, what, starts=(3.0, 20.0, 120.0))
+    return Parameter("time_constant", "s", 1.0, 1e5, 30.0, what, starts=(3.0, 20.0, 120.0))
 
 
 EFFECT = Effect(
@@ -81,6 +90,14 @@ EFFECT = Effect(
             what="with the logarithm of time in the end",
             parameters=(_RATE, _time_constant("time from which the rate falls")),
             blocks={"sensor": logarithmic},
+            state=(0.0,),
+        ),
+        Form(
+            name="turning",
+            what="turns back, as the warmth of a room",
+            parameters=(_RATE, _time_constant("time after which it turns")),
+            sought=False,
+            blocks={"sensor": turning},
             state=(0.0,),
         ),
     ),

@@ -6,8 +6,11 @@
   overshoots. Earlier positions are taken at least seven tenths of `window` apart: noise of position grows with
   1/window², and stamps of two interleaved clocks come close together.
 - `damped`: mass · (acceleration + damping_rate · speed), a mass in oil or with a cable dragging.
+- `growing`: a mass m that goes with the place, as of a cable chain that lays itself down: m a + m' v²/2, which is the
+  momentum's rate and what Lagrange's equation gives. `mass` is that at `at_depth`.
 - `sprung`: the mass sits on a spring and damper of its own: natural frequency and damping ratio. Exact for an
   acceleration that is constant over each step, and brings the speed of the last step to that of this one.
+- `hung`: a share of the mass is sprung, the rest rigid: a cable or hose on a carriage.
 
 `mass` in kg, positions in mm: the force is mass/1000 · mm/s².
 
@@ -17,6 +20,7 @@ Reference: L. Meirovitch, Fundamentals of Vibrations, McGraw-Hill, 2001 (rigid a
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.linear import swing
@@ -26,6 +30,7 @@ _STARTED = 0
 _AGES = 1
 _PLACES = 5
 _KNOTS = 4
+_HUNG = 9  # y, its speed, deflection and its speed
 _APART = 0.7
 _KG_MM = 1e-3
 """N per kg mm/s²."""
@@ -33,10 +38,24 @@ _KG_MM = 1e-3
 
 @block
 def rigid(dt: float, y: float, state: State, p: State) -> float:
-    """Force on the mass in N; p = (mass, damping_rate, window, lead).
+    """Force on the mass in N; p = (mass, damping_rate, window, lead, growth, at_depth, hung, frequency, damping_ratio).
 
-    State: the last four knots, newest first: time since each, and position there.
+    State: the last four knots, newest first: time since each, and position there; then that of the part that is hung.
     """
+    hanging = 0.0
+    if p[6] > 0.0:
+        if state[_STARTED] == 0.0:
+            state[_HUNG] = y
+        omega = 2.0 * math.pi * p[7]
+        if dt > 0.0:
+            step_speed = (y - state[_HUNG]) / dt
+            rest = (state[_HUNG + 1] - step_speed) / (dt * omega * omega)
+            e, de = swing(dt, state[_HUNG + 2] - rest, state[_HUNG + 3], omega, p[8])
+            state[_HUNG] = y
+            state[_HUNG + 1] = step_speed
+            state[_HUNG + 2] = rest + e
+            state[_HUNG + 3] = de
+        hanging = -p[6] * (omega * omega * state[_HUNG + 2] + 2.0 * p[8] * omega * state[_HUNG + 3])
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
         for i in range(_KNOTS):  # at rest before the data
@@ -59,7 +78,10 @@ def rigid(dt: float, y: float, state: State, p: State) -> float:
             state[_PLACES + i] = state[_PLACES + i - 1]
         state[_AGES] = 0.0
         state[_PLACES] = y
-    return _KG_MM * p[0] * (acceleration + p[1] * (speed + 0.5 * p1 * newer))
+    now = speed + 0.5 * p1 * newer
+    here = max(1.0 + p[4] * (y - p[5]), 0.0)
+    felt = (1.0 - p[6]) * (here * acceleration + 0.5 * p[4] * now * now)
+    return _KG_MM * p[0] * (felt + hanging + p[1] * now)
 
 
 @block
@@ -90,6 +112,15 @@ _LEAD = Parameter(
 _WINDOW = Parameter(
     "window", "s", 1e-5, 0.02, 0.002, "least time over which acceleration is taken", starts=(2e-4, 1e-3, 3e-3)
 )
+_FREQUENCY = Parameter("frequency", "Hz", 1.0, 2000.0, 80.0, "natural frequency", starts=(20.0, 50.0, 120.0, 300.0))
+_DAMPING = Parameter("damping_ratio", "1", 1e-3, 0.95, 0.3, "damping over critical damping", starts=(0.05, 0.5))
+
+
+def _packed(values: Mapping[str, float]) -> tuple[float, ...]:
+    names = ("damping_rate", "window", "lead", "growth", "at_depth", "share")
+    given = (values.get(name, 0.0) for name in names)
+    return (values["mass"], *given, values.get("frequency", 1.0), values.get("damping_ratio", 0.5))
+
 
 EFFECT = Effect(
     id="inertia",
@@ -103,8 +134,8 @@ EFFECT = Effect(
             what="mass times acceleration",
             parameters=(_MASS, _WINDOW, _LEAD),
             blocks={"probe": rigid},
-            state=(0.0,) * 9,
-            pack=lambda values: (values["mass"], 0.0, values["window"], values["lead"]),
+            state=(0.0,) * 13,
+            pack=_packed,
         ),
         Form(
             name="damped",
@@ -116,18 +147,46 @@ EFFECT = Effect(
                 _LEAD,
             ),
             blocks={"probe": rigid},
-            state=(0.0,) * 9,
+            state=(0.0,) * 13,
+            pack=_packed,
         ),
         Form(
             name="sprung",
             what="the mass swings on a spring of its own",
-            parameters=(
-                _MASS,
-                Parameter("frequency", "Hz", 1.0, 2000.0, 80.0, "natural frequency", starts=(20.0, 50.0, 120.0, 300.0)),
-                Parameter("damping_ratio", "1", 1e-3, 0.95, 0.3, "damping over critical damping", starts=(0.05, 0.5)),
-            ),
+            parameters=(_MASS, _FREQUENCY, _DAMPING),
             blocks={"probe": sprung},
             state=(0.0,) * 5,
+        ),
+        Form(
+            name="growing",
+            what="the mass that moves changes along the way, as of a cable chain",
+            parameters=(
+                _MASS,
+                Parameter("growth", "1/mm", -5.0, 5.0, 0.0, "relative growth of the mass per mm", starts=(-0.2, 0.2)),
+                Parameter("at_depth", "mm", 1e-3, 100.0, 1.0, "depth at which the mass holds", fixed=True),
+                _WINDOW,
+                _LEAD,
+            ),
+            sought=False,
+            blocks={"probe": rigid},
+            state=(0.0,) * 13,
+            pack=_packed,
+        ),
+        Form(
+            name="hung",
+            what="a part of the mass swings on a spring of its own, as a cable or hose",
+            parameters=(
+                _MASS,
+                Parameter("share", "1", 0.0, 1.0, 0.4, "share of the mass that swings"),
+                _FREQUENCY,
+                _DAMPING,
+                _WINDOW,
+                _LEAD,
+            ),
+            sought=False,
+            blocks={"probe": rigid},
+            state=(0.0,) * 13,
+            pack=_packed,
         ),
     ),
 )

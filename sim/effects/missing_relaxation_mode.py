@@ -9,6 +9,11 @@ enough, the believed modes give way too, in proportion: c_0 is then 0.
   transform (V. M. Zolotarev, One-dimensional Stable Distributions, AMS, 1986), so they move smoothly with β.
 - `box`: a spectrum even in the logarithm of the rate, `decades` wide, as ten modes (Y. C. Fung, Biomechanics:
   Mechanical Properties of Living Tissues, 2nd ed., Springer, 1993, chapter 7).
+- `power`: a power of time in the end, share · (1 + t/τ)^(−n), 1/e at 1/rate (P. G. Nutting, J. Franklin Inst. 191,
+  1921, 679–685): rates after the gamma distribution, as ten modes at its quantiles.
+- `fractional`: share · E_α(−(rate t)^α) with Mittag-Leffler's function, a fractional element (R. C. Koeller, J. Appl.
+  Mech. 51, 1984, 299–307). Its rates are spread as by K. S. Cole, R. H. Cole, J. Chem. Phys. 9, 1941, 341–351: ten
+  modes at quantiles.
 """
 
 from __future__ import annotations
@@ -78,6 +83,29 @@ def _box(pad: Pad, values: Mapping[str, float]) -> Pad:
     return _with_modes(pad, [float(values["share"] * 0.5 * w) for w in weights], [float(k) for k in rates])
 
 
+@functools.lru_cache(maxsize=64)
+def _gamma_rates(n: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Weights and rates of modes that add up to (1 + t/τ)^−n, 1/e at t = 1."""
+    from scipy.special import gammaincinv
+
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    rates = gammaincinv(n, 0.5 * (1.0 + nodes)) * math.expm1(1.0 / n)
+    return tuple(0.5 * weights), tuple(float(rate) for rate in rates)
+
+
+def _power(pad: Pad, values: Mapping[str, float]) -> Pad:
+    weights, rates = _gamma_rates(values["power"])
+    return _with_modes(pad, [values["share"] * w for w in weights], [values["rate"] * k for k in rates])
+
+
+def _fractional(pad: Pad, values: Mapping[str, float]) -> Pad:
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    order, below = values["order"], 0.5 * (1.0 + nodes)
+    rates = (np.sin(math.pi * order * below) / np.sin(math.pi * order * (1.0 - below))) ** (1.0 / order)
+    shares = [float(values["share"] * 0.5 * w) for w in weights]
+    return _with_modes(pad, shares, [float(values["rate"] * k) for k in rates])
+
+
 _SHARE = Parameter(
     "share", "1", 0.0, 1.0, 0.1, "share of the force that relaxes in this way", required=True, amplitude=True
 )
@@ -119,6 +147,28 @@ EFFECT = Effect(
                 Parameter("decades", "1", 0.1, 6.0, 2.0, "width of the span in powers of ten", starts=(1.0, 3.0)),
             ),
             amend=_box,
+        ),
+        Form(
+            name="power",
+            what="a power of time in the end (Nutting)",
+            parameters=(
+                _SHARE,
+                _RATE,
+                Parameter("power", "1", 0.5, 10.0, 2.0, "exponent of time in the end", starts=(1.0, 2.0, 4.0)),
+            ),
+            sought=False,
+            amend=_power,
+        ),
+        Form(
+            name="fractional",
+            what="a fractional element",
+            parameters=(
+                _SHARE,
+                _RATE,
+                Parameter("order", "1", 0.3, 0.98, 0.75, "order of the derivative", starts=(0.6, 0.85)),
+            ),
+            sought=False,
+            amend=_fractional,
         ),
     ),
 )

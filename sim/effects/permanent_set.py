@@ -1,7 +1,8 @@
 """Permanent set: the surface sinks with the depth reached, and does not come back.
 
 - `linear`: by set · deepest.
-- `power`: by set · deepest^n, progressive above n = 1.
+- `power`: by set · deepest (deepest/reach)^(n − 1), progressive above n = 1.
+- `saturating`: by limit · (1 − e^(−set · deepest/limit)): set · deepest at first, and no more than the limit.
 - `yielding`: by set · (deepest − limit), once the deepest exceeds the limit.
 - `gradual`: towards set · deepest at a rate in time, only while pressed (the rate is scaled by depth/deepest).
 
@@ -30,9 +31,16 @@ def linear(dt: float, y: float, state: State, p: State) -> float:
 
 @block
 def power(dt: float, y: float, state: State, p: State) -> float:
-    """Depth below the sunken surface; p = (set, exponent)."""
+    """Depth below the sunken surface; p = (set, exponent, reach)."""
     state[_DEEPEST] = max(state[_DEEPEST], y)
-    return float(y - min(p[0] * state[_DEEPEST] ** p[1], state[_DEEPEST]))
+    return float(y - min(p[0] * p[2] * (state[_DEEPEST] / p[2]) ** p[1], state[_DEEPEST]))
+
+
+@block
+def saturating(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the sunken surface; p = (set, limit)."""
+    state[_DEEPEST] = max(state[_DEEPEST], y)
+    return y + p[1] * math.expm1(-p[0] * max(state[_DEEPEST], 0.0) / p[1])
 
 
 @block
@@ -83,9 +91,21 @@ EFFECT = Effect(
             what="at once, with a power of the deepest depth",
             parameters=(
                 _SET,
-                Parameter("exponent", "1", 0.2, 5.0, 1.5, "power of the deepest depth in mm", starts=(0.7, 1.5, 2.5)),
+                Parameter("exponent", "1", 0.2, 5.0, 1.5, "power of the deepest depth", starts=(0.7, 1.5, 2.5)),
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "deepest depth at which `set` is the mean", fixed=True),
             ),
             blocks={"depth": power},
+            state=(0.0,),
+        ),
+        Form(
+            name="saturating",
+            what="at once, ever less with the deepest depth",
+            parameters=(
+                _SET,
+                Parameter("limit", "mm", 1e-4, 50.0, 0.1, "how far it sinks at the most", starts=(0.02, 0.1)),
+            ),
+            sought=False,
+            blocks={"depth": saturating},
             state=(0.0,),
         ),
         Form(

@@ -103,8 +103,8 @@ EFFECT = Effect(
             parameters=(
                 _SHARE,
                 _DEPTH,
-                Parameter("power", "1", 1.5, 8.0, 2.5, "power of the depth that the energy goes with"),
-                Parameter("growth", "1", 0.0, 10.0, 0.1, "growth of the scale with the greatest energy"),
+                Parameter("power", "1", 1.0, 8.0, 2.5, "power of the depth that the energy goes with"),
+                Parameter("growth", "1", 0.0, 10.0, 0.1, "growth of the scale with the greatest energy", fixed=True),
                 Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth below which `depth` counts", fixed=True),
                 _ALREADY,
             ),

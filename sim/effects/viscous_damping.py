@@ -11,6 +11,8 @@ depends on depth: in the middle of what benches do, where forms agree on it, and
 - `with_stiffness`: coefficient · e^(a(δ − at_depth)) v, damping in proportion to a stiffness that grows exponentially.
 - `power`: coefficient · v ((v² + v_0²)/(SPEED_MM_S² + v_0²))^((n−1)/2): shear thinning below n = 1, linear under
   v_0 = 0.05 mm/s.
+- `one_sided`: coefficient · (1 + differs · sgn v) v: more on the way in than on the way out, or less; `coefficient` is
+  the mean of both.
 """
 
 from __future__ import annotations
@@ -62,6 +64,16 @@ def power(dt: float, depth: float, state: State, p: State) -> float:
     speed = moved / dt
     square = (speed * speed + _SLOW * _SLOW) / (SPEED_MM_S * SPEED_MM_S + _SLOW * _SLOW)
     return float(p[0] * speed * square ** (0.5 * (p[1] - 1.0)))
+
+
+@block
+def one_sided(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot that differs by direction; p = (coefficient, differs)."""
+    moved = max(depth, 0.0) - max(state[0], 0.0)
+    state[0] = depth
+    if dt <= 0.0:
+        return 0.0
+    return p[0] * (1.0 + p[1] if moved > 0.0 else 1.0 - p[1]) * moved / dt
 
 
 def _coefficient(what: str) -> Parameter:
@@ -116,6 +128,17 @@ EFFECT = Effect(
                 Parameter("exponent", "1", 0.35, 1.6, 0.6, "power of the speed", starts=(0.5, 0.7, 1.3)),
             ),
             blocks={"contact": power},
+            state=(0.0,),
+        ),
+        Form(
+            name="one_sided",
+            what="more one way than the other",
+            parameters=(
+                _coefficient("force per speed, mean of both ways"),
+                Parameter("differs", "1", -0.95, 0.95, 0.2, "by how much each way differs from the mean"),
+            ),
+            sought=False,
+            blocks={"contact": one_sided},
             state=(0.0,),
         ),
     ),

@@ -271,6 +271,27 @@ class TestInertia:
         force = simulate(AIR, [active("inertia", "sprung", mass=0.2, frequency=60.0, damping_ratio=0.7)], self.t, x)
         assert_allclose(force[100:], 0.2, rtol=1e-6)
 
+    def test_a_mass_that_grows_along_the_way_keeps_the_balance_of_energy(self) -> None:
+        """Work done on it from rest is its kinetic energy at the end."""
+        t = np.arange(20001) * 1e-4
+        x = 1.0 - np.cos(np.pi * t)
+        chain = active("inertia", "growing", mass=0.3, growth=0.4, at_depth=0.8, window=1e-4)
+        force = simulate(AIR, [chain], t, x)
+        speed = np.pi * np.sin(np.pi * t)
+        work = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(x))])
+        energy = 0.5e-3 * 0.3 * (1 + 0.4 * (x - 0.8)) * speed**2
+        assert_allclose(work, energy, atol=2e-3 * energy.max())
+
+    def test_a_part_that_hangs_is_so_much_of_the_sprung_mass_and_of_the_rigid_one(self) -> None:
+        x = 3.0 * np.sin(2 * np.pi * 4.0 * self.t)
+        sprung = {"frequency": 20.0, "damping_ratio": 0.3}
+        parts = [
+            simulate(AIR, [active("inertia", mass=0.2)], self.t, x),
+            simulate(AIR, [active("inertia", "sprung", mass=0.2, **sprung)], self.t, x),
+        ]
+        both = simulate(AIR, [active("inertia", "hung", mass=0.2, share=0.3, **sprung)], self.t, x)
+        assert_allclose(both, 0.7 * parts[0] + 0.3 * parts[1], atol=1e-12)
+
 
 class TestPeriodic:
     def test_cogging(self) -> None:
@@ -280,6 +301,29 @@ class TestPeriodic:
         numbers = {"amplitude": 0.2, "period": 1.6, "phase": 0.3, "ratio": 0.4, "second_phase": 1.0}
         both = simulate(AIR, [active("cogging", "harmonics", **numbers)], x + 5, x)
         assert_allclose(both - sine, 0.08 * np.sin(4 * np.pi * x / 1.6 + 1.0), atol=1e-14)
+
+    def test_a_ripple_that_swells(self) -> None:
+        x = np.linspace(-5.0, -1.0, 801)
+        numbers = {"amplitude": 0.2, "period": 1.6, "phase": 0.3, "growth": 0.1, "at_depth": 1.0}
+        force = simulate(AIR, [active("cogging", "swelling", **numbers)], x + 5, x)
+        assert_allclose(force, 0.2 * (1 + 0.1 * (x - 1)) * np.sin(2 * np.pi * x / 1.6 + 0.3), atol=1e-14)
+
+    def test_a_ripple_that_trails(self) -> None:
+        x = -5.0 + ramp(4.0, 801)
+        numbers = {"amplitude": 0.2, "period": 1.6, "phase": 0.3, "trail": 0.2}
+        force = simulate(AIR, [active("cogging", "trailing", **numbers)], np.arange(x.size) * 1e-3, x)
+        for way, behind in ((slice(50, 801), -0.1), (slice(850, 1601), 0.1)):
+            assert_allclose(force[way], 0.2 * np.sin(2 * np.pi * (x[way] + behind) / 1.6 + 0.3), atol=1e-12)
+
+    def test_an_encoder_error_that_fades(self) -> None:
+        numbers = {"amplitude": 0.05, "period": 0.8, "phase": 0.5, "growth": -0.3, "at_depth": 1.0}
+        cascade = Cascade(LINEAR, [active("encoder_error", "fading", **numbers)])
+        true = np.linspace(-1.0, 2.0, 601)
+        plant = cascade.plant()
+        reported = np.array([plant.reported_mm(float(x)) for x in true])
+        wave = 0.05 * (1 - 0.3 * (true - 1)) * np.sin(2 * np.pi * true / 0.8 + 0.5)
+        assert_allclose(reported - true, wave, atol=1e-14)
+        assert_allclose(cascade.simulate(true + 1, reported), K * np.maximum(true, 0.0), atol=1e-11)
 
     def test_the_encoder_reports_true_plus_error_and_is_undone_before_the_plant(self) -> None:
         for form in ("sine", "harmonics"):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.special import erfcx
 
 from sim.effects import effect
 from sim.effects.missing_relaxation_mode import _stretched_rates
@@ -102,6 +103,21 @@ class TestMissingMode:
         even = np.exp(-np.outer(self.t, 0.5 * (rates[1:] + rates[:-1]))).mean(axis=1)
         assert_allclose(out, 0.4 + 0.6 * even, atol=1e-4)
 
+    @pytest.mark.parametrize("power", [0.7, 1.5, 4.0])
+    def test_power(self, power: float) -> None:
+        numbers = {"share": 0.5, "rate": 2.0, "power": power}
+        out = self.relaxed(LINEAR, [active("missing_relaxation_mode", "power", **numbers)], self.t)
+        tau = 1 / (2.0 * math.expm1(1 / power))
+        seen = self.t < 10
+        assert_allclose(out[seen], 0.5 + 0.5 * (1 + self.t[seen] / tau) ** -power, atol=0.5 * 0.01)
+
+    def test_fractional_at_one_half(self) -> None:
+        """E_½(−√t) = e^t erfc(√t)."""
+        numbers = {"share": 0.5, "rate": 2.0, "order": 0.5}
+        out = self.relaxed(LINEAR, [active("missing_relaxation_mode", "fractional", **numbers)], self.t)
+        seen = (self.t > 0.01) & (self.t < 10)
+        assert_allclose(out[seen], 0.5 + 0.5 * erfcx(np.sqrt(2.0 * self.t[seen])), atol=0.5 * 0.02)
+
 
 CYCLES = np.concatenate([ramp(1.0, 501), ramp(1.0, 501)[1:], ramp(1.5, 751)[1:]])
 TIME = np.arange(CYCLES.size) * 1e-3
@@ -161,6 +177,10 @@ class TestPermanentSet:
         for deepest in (0.5, 2.0):
             assert_allclose(self.surface("linear", deepest, set=0.1), 0.1 * deepest, rtol=1e-9)
             assert_allclose(self.surface("power", deepest, set=0.1, exponent=1.7), 0.1 * deepest**1.7, rtol=1e-9)
+            whole = self.surface("power", deepest, set=0.1, exponent=1.7, reach=deepest)
+            assert_allclose(whole, 0.1 * deepest, rtol=1e-9)
+            sunk = 0.15 * (1 - math.exp(-0.1 * deepest / 0.15))
+            assert_allclose(self.surface("saturating", deepest, set=0.1, limit=0.15), sunk, rtol=1e-9)
         assert_allclose(self.surface("yielding", 2.0, set=0.1, limit=0.8), 0.12, rtol=1e-9)
         assert_allclose(self.surface("yielding", 0.7, set=0.1, limit=0.8), 0.0, atol=1e-12)
 
@@ -194,7 +214,27 @@ class TestDamage:
             force = simulate(LINEAR, [active("damage", form, rate=rate)], t, cycles)
             assert_allclose(force[crests], K * factor, rtol=1e-9)
         floor = simulate(LINEAR, [active("damage", rate=rate, floor=0.6)], t, cycles)
-        assert_allclose(floor[crests], K * (0.6 + 0.4 * np.exp(-rate * travel)), rtol=1e-9)
+        assert_allclose(floor[crests], K * (0.6 + 0.4 * np.exp(-rate / 0.4 * travel)), rtol=1e-9)
+
+    @pytest.mark.parametrize("power", [-3.0, -1.0, 0.0, 1.0, 6.0])
+    def test_the_power_form_solves_its_law(self, power: float) -> None:
+        """d(factor)/d(travel) = −rate · factor^(1 + k): each mm takes what is left to a power."""
+        x = ramp(2.0, 4001, False)
+        numbers = {"rate": 0.05, "power": power, "dead_band": 0.0}
+        force = simulate(LINEAR, [active("damage", "power", **numbers)], np.arange(x.size) * 1e-3, x)
+        factor = force[1:] / (K * x[1:])
+        slope = np.gradient(factor, x[1:])[1:-1]
+        assert_allclose(slope, -0.05 * factor[1:-1] ** (1 + power), rtol=1e-5)
+
+    @pytest.mark.parametrize(
+        ("form", "more"),
+        [("exponential", {"floor": 0.7}), ("power", {"power": 4.0}), ("energy", {"exponent": 1.5, "floor": 0.5})],
+    )
+    def test_the_first_stroke_costs_the_rate(self, form: str, more: dict[str, float]) -> None:
+        """Down to 1 mm, where the weight by energy has its mean."""
+        numbers = {"rate": 1e-4, "dead_band": 0.0, **more}
+        force = simulate(LINEAR, [active("damage", form, **numbers)], TIME[:501], ramp(1.0, 501, False))
+        assert_allclose(1 - force[-1] / K, 1e-4, rtol=1e-3)
 
     def test_by_energy_deep_travel_counts_more(self) -> None:
         for deepest in (1.0, 2.0):
@@ -202,7 +242,18 @@ class TestDamage:
                 LINEAR, [active("damage", "energy", rate=0.1, exponent=1.0, dead_band=0.0)], TIME[:501],
                 ramp(deepest, 501, False),
             )  # fmt: skip
-            assert_allclose(force[-1], K * deepest * math.exp(-0.1 * deepest**2 / 2), rtol=1e-9)
+            assert_allclose(force[-1], K * deepest * math.exp(-0.1 * deepest**2), rtol=1e-9)
+
+    def test_a_pad_that_has_let_go_is_loaded_from_its_own_surface_on(self) -> None:
+        """It has relaxed at 1 mm, and stays sunk for a while: off and on again at once loads next to nothing of it."""
+        pad = Pad(Exponential(K, 0.0), Relaxation((0.99,), (100.0,)), unilateral=True)
+        x = np.concatenate([ramp(1.0, 101, False), np.full(1000, 1.0), ramp(1.0, 11)[10:], ramp(1.0, 11, False)])
+        plant = Cascade(pad, [active("damage", rate=0.2)]).plant()
+        force, elastic = np.array([(plant.step(1e-3, float(p)), plant.elastic_force_N) for p in x]).T
+        assert force[1111] == 0.0
+        assert_allclose(elastic[1100], K * math.exp(-0.2 * 0.996), rtol=1e-6)
+        surface = 0.99 * math.exp(-0.01 * 100 * 0.02)  # it comes up as what is left of the modes lets it
+        assert_allclose(elastic[-1], K * math.exp(-0.2 * (1.992 - surface)), rtol=2e-3)
 
     def test_noise_of_position_does_not_wear_the_pad(self) -> None:
         noise = 5e-4 * np.random.default_rng(4).standard_normal(60000)
@@ -213,16 +264,17 @@ class TestDamage:
 
 
 class TestRates:
-    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic", "free_volume"])
+    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic", "free_volume", "knee"])
     def test_relaxation_at_a_depth_runs_on_a_clock_of_its_own(self, form: str) -> None:
         slope, depth = -0.25, 1.5
         factors = {"linear": 0.625, "exponential": math.exp(-0.375), "hyperbolic": 1 / 1.375}
+        factors["knee"] = 0.625  # at the knee
         factor = factors.get(form, math.exp(-0.375 / 1.375))  # with half the slope left at 4 mm
         t = np.linspace(0.0, 3.0, 301)
         force = simulate(SOFT, [active("depth_dependent_relaxation", form, slope=slope)], t, np.full(t.size, depth))
         assert_allclose(force / force[0], GEL.reduced(factor * t), rtol=1e-10)
 
-    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic", "free_volume"])
+    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic", "free_volume", "knee"])
     def test_rates_stay_above_0_and_finite(self, form: str) -> None:
         block = effect("depth_dependent_relaxation").form(form).blocks["rate"]
         for slope in (-5.0, -0.5, 0.0, 0.5, 5.0):
@@ -243,6 +295,7 @@ class TestViscousDamping:
             ("hunt_crossley", {"exponent": 1.5, "at_depth": 0.8}, lambda x: 4.0 * (x / 0.8) ** 1.5),
             ("with_stiffness", {"growth": 0.7, "at_depth": 0.8}, lambda x: 4.0 * np.exp(0.7 * (x - 0.8))),
             ("power", {"exponent": 0.5}, lambda x: 4.0 * (4.0 / 20.0) ** -0.5),
+            ("one_sided", {"differs": 0.3}, lambda x: 4.0 * 1.3),
         ],
     )
     def test_force_at_a_steady_speed(self, form: str, more: dict[str, float], factor) -> None:
@@ -254,7 +307,7 @@ class TestViscousDamping:
         assert_allclose(force[512:], K * 1.5, rtol=1e-12)
         assert_allclose(force[:10], 0.0)
 
-    @pytest.mark.parametrize("form", ["linear", "hunt_crossley", "with_stiffness", "power"])
+    @pytest.mark.parametrize("form", ["linear", "hunt_crossley", "with_stiffness", "power", "one_sided"])
     @pytest.mark.parametrize("unilateral", [True, False])
     def test_it_takes_energy_in_every_loop(self, form: str, unilateral: bool) -> None:
         t = np.arange(2001) * 1e-3
@@ -277,7 +330,7 @@ class TestSeparationAndAdhesion:
         [
             ("exponential", lambda g: np.exp(-g / 0.2)),
             ("linear", lambda g: np.maximum(0, 1 - g / 0.2)),
-            ("van_der_waals", lambda g: (1 + g / 0.2) ** -2.0),
+            ("van_der_waals", lambda g: (1 + g / 0.2 * (math.sqrt(math.e) - 1)) ** -2.0),
         ],
     )
     def test_reversible_pull(self, form: str, shape) -> None:
@@ -296,6 +349,37 @@ class TestSeparationAndAdhesion:
         pull = -0.3 * np.maximum(0, 1 - gap / 0.2)
         assert_allclose(way_out[:990], pull[:990], atol=1e-6)
         assert_allclose(way_in[1500:], way_out[1500:], atol=1e-6)
+
+    @pytest.mark.parametrize("form", ["exponential", "van_der_waals"])
+    def test_a_pull_that_ends_nowhere_has_fallen_to_1_e_at_the_range(self, form: str) -> None:
+        force = simulate(LINEAR, [active("adhesion", form, pull_off=0.3, range=0.2)], TIME[:2], np.full(2, -0.2))
+        assert_allclose(force, -0.3 / math.e, rtol=1e-12)
+
+    def test_a_bond_that_tears_while_it_pulls(self) -> None:
+        x = 1.0 - np.linspace(0.0, 1.3, 2601)
+        stick = active("adhesion", "sticking", pull_off=0.3, range=0.2, dwell=0.01, left=0.4)
+        force = simulate(LINEAR, [stick], np.arange(x.size) * 1e-3, x)
+        gap = -x
+        out = gap > 1e-9
+        assert_allclose(force[out], np.where(gap < 0.2, -0.3 * (1 - 0.6 * gap / 0.2), 0.0)[out], atol=1e-6)
+
+    def test_a_neck_pulls_most_when_it_is_stretched(self) -> None:
+        x = ramp(2.0, 2001) - 1.0
+        neck = active("adhesion", "necking", pull_off=0.3, range=0.2, crest=0.25)
+        force = simulate(LINEAR, [neck], np.arange(x.size) * 1e-3, x)
+        gap = np.maximum(-x[2000:], 0.0)
+        pull = np.interp(gap, [0.0, 0.05, 0.2], [0.0, 0.3, 0.0])
+        assert_allclose(force[:1000], 0.0, atol=1e-12)
+        assert_allclose(force[2000:], K * np.maximum(x[2000:], 0.0) - pull, atol=1e-9)
+
+    def test_a_neck_that_snaps(self) -> None:
+        x = ramp(2.0, 2001) - 1.0005
+        neck = active("adhesion", "stretching", pull_off=0.3, range=0.2)
+        force = simulate(LINEAR, [neck], np.arange(x.size) * 1e-3, x)
+        gap = np.maximum(-x[2000:], 0.0)
+        pull = np.where(gap < 0.2, 0.3 * np.sin(0.5 * np.pi * gap / 0.2), 0.0)
+        assert_allclose(force[:1000], 0.0, atol=1e-12)
+        assert_allclose(force[2000:], K * np.maximum(x[2000:], 0.0) - pull, atol=1e-9)
 
     def test_a_torn_bond_does_not_come_back_by_itself(self) -> None:
         plant = Cascade(LINEAR, [active("adhesion", "sticking", pull_off=0.3, range=0.2, dwell=0.01)]).plant()

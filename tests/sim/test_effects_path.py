@@ -147,7 +147,7 @@ class TestBiasDriftHum:
     def test_bias(self) -> None:
         assert_allclose(sense(active("force_bias", bias=-0.2), EVEN[:3], np.array([0.0, 1.0, 2.0])), [-0.2, 0.8, 1.8])
 
-    @pytest.mark.parametrize("form", ["linear", "settling", "root", "logarithmic"])
+    @pytest.mark.parametrize("form", ["linear", "settling", "root", "logarithmic", "turning"])
     def test_all_drifts_begin_at_the_rate(self, form: str) -> None:
         t = np.array([5.0, 5.001])
         assert_allclose(sense(active("force_drift", form, rate=-0.3), t, np.zeros(2)), [0.0, -0.3e-3], rtol=1e-4)
@@ -158,6 +158,8 @@ class TestBiasDriftHum:
         numbers = {"rate": 0.01, "time_constant": 20.0}
         assert_allclose(sense(active("force_drift", rate=0.01), t, zero), 0.01 * t)
         assert_allclose(sense(active("force_drift", "settling", **numbers), t, zero)[1:], 0.2)
+        turns = sense(active("force_drift", "turning", **numbers), np.array([0.0, 20.0, 40.0]), zero)
+        assert_allclose(turns, [0.0, 0.4 / math.pi, 0.0], atol=1e-12)
         root = sense(active("force_drift", "root", **numbers), t, zero)
         assert_allclose(root[2] / root[1], 2.0, rtol=0.05)
         log = sense(active("force_drift", "logarithmic", **numbers), t, zero)

@@ -1,0 +1,140 @@
+"""The other shapes of a cause's family: each fitted in place of the one that leads, and what it is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.effects import Form
+
+from .candidates import CHANNEL, Reach, combinations, narrowed
+from .data import Data
+from .modes import missing_told
+from .numbers import Structure, cause_of
+from .refit import Fit, force_at, refit
+
+Array = NDArray[np.float64]
+
+STEPS, STARTS = 8, 12  # of the fit of another shape
+FEW, TRIED = 3, 2  # steps of the best starts
+NEARLY = 1e-5  # of χ², that a step must promise
+END = 25  # steps of the one that is taken
+WORKERS = 2
+
+
+@dataclass(frozen=True)
+class Member:
+    """A shape of a family, fitted in the place `index` of a fit's causes."""
+
+    fit: Fit
+    index: int
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Its numbers."""
+        return self.fit.structure.values(self.fit.x)[self.index]
+
+    @property
+    def variances(self) -> dict[str, float]:
+        """Of those that were fitted, in the fit's coordinates, for white noise."""
+        s = self.fit.structure
+        spread = np.diag(self.fit.covariance())[s.of_cause(self.index)]
+        return dict(zip([p.name for p in s.causes[self.index].fitted], spread.tolist(), strict=True))
+
+
+def stand_in(data: Data, fit: Fit) -> tuple[Data, Fit, list[int]]:
+    """Short data, the fit carried on there without what detectors find, and which of its causes are left."""
+    short = data if data.short is None else data.short
+    kept = [i for i, c in enumerate(fit.structure.causes) if c.id not in CHANNEL]
+    structure = replace(fit.structure, causes=tuple(fit.structure.causes[i] for i in kept))
+    values = fit.structure.values(fit.x)
+    x = structure.x(fit.x[: len(structure.pad.coordinates)], [values[i] for i in kept], fit.of_run)
+    return short, refit(short, structure, x, STEPS, 1e-6), kept
+
+
+def families(short: Data, lead: Fit, indices: Sequence[int]) -> list[list[Member]]:
+    """Of each of some causes, the shape that leads and those others of its family that make a plant."""
+    tried = [
+        (index, form)
+        for index in indices
+        for form in lead.structure.causes[index].effect.forms
+        if form.name != lead.structure.causes[index].form.name and _comparable(lead.structure.causes[index].form, form)
+    ]
+    with ThreadPoolExecutor(WORKERS) as pool:
+        found = list(pool.map(lambda pair: _other(short, lead, *pair), tried))
+    return [
+        [Member(lead, index), *(m for (i, _), m in zip(tried, found, strict=True) if i == index and m is not None)]
+        for index in indices
+    ]
+
+
+def scores(short: Data, members: Sequence[Member]) -> Array:
+    """χ² of each with what its numbers cost (G. Schwarz, Ann. Statist. 6, 1978, 461–464).
+
+    What the best of them leaves beyond the noise counts as noise, that of the colour too: no shape is exact.
+    """
+    entries = float(np.count_nonzero(short.weight > 0))
+    scale = max(min(m.fit.chi2 / max(entries - m.fit.free, 1.0) for m in members), 1.0)
+    cost = float(np.log(max(short.weight.sum() / scale**2, 20.0)))
+    return np.array([m.fit.chi2 / scale + cost * m.fit.free for m in members])
+
+
+def reshaped(data: Data, fit: Fit, own: int = 0) -> Fit:
+    """The fit with each of its causes in the best of its shapes; `own`: causes at the begin that stay as they are."""
+    short, lead, kept = stand_in(data, fit)
+    if len(kept) < len(fit.structure.causes):
+        return fit
+    lead = taken = replace(lead, x=missing_told(lead, lead.structure))
+    for index in range(own, len(kept)):
+        members = families(short, taken, [index])[0]
+        score = scores(short, members)
+        best = int(np.argmin(score))
+        if best > 0:
+            taken = refit(short, members[best].fit.structure, members[best].fit.x, END, 1e-8)
+    return fit if taken is lead else taken
+
+
+def _comparable(one: Form, other: Form) -> bool:
+    """Whether two forms have the same numbers beside those of their shapes."""
+    return [p.name for p in one.parameters if p.required] == [p.name for p in other.parameters if p.required]
+
+
+def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
+    """Another shape in place of a cause of a fit, carried to its minimum; None where it makes no plant."""
+    structure, values = lead.structure, lead.structure.values(lead.x)
+    cause = structure.causes[index]
+    shape = narrowed(form, _reach(short, structure))
+    told = {p.name: values[index][p.name] for p in shape.parameters if p.name in values[index]}
+    every = list(combinations(shape))
+    others = every[:: max(1, len(every) // STARTS)]
+    pad = lead.x[: len(structure.pad.coordinates)]
+    begun: list[tuple[float, Structure, Array]] = []
+    for started in [{}, *others]:
+        own = cause_of(cause.effect, shape, told | started)
+        joined = replace(structure, causes=(*structure.causes[:index], own, *structure.causes[index + 1 :]))
+        x = joined.x(pad, [*values[:index], own.start, *values[index + 1 :]], lead.of_run)
+        force = force_at(short, joined, x)
+        if not np.isfinite(force).all():
+            continue
+        e = short.whitened(short.force_N - force)
+        begun.append((float(np.sum(e * e)), joined, x))
+    begun.sort(key=lambda start: start[0])
+    tried = [refit(short, joined, x, FEW, NEARLY) for _, joined, x in begun[:TRIED]]
+    if not tried:
+        return None
+    best = min(tried, key=lambda fit: fit.chi2)
+    return Member(refit(short, best.structure, best.x, STEPS, NEARLY), index)
+
+
+def _reach(short: Data, structure: Structure) -> Reach:
+    return Reach(
+        sample_s=short.sample_s,
+        span_s=float(short.time_s[-1] - short.time_s[0]),
+        travel_mm=float(np.ptp(short.position_mm)),
+        depth_mm=structure.pad.depth_mm,
+        force_N=structure.pad.force_N,
+    )

@@ -1,0 +1,76 @@
+"""Shapes of a family beside the one that leads; data of the independent simulator."""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bench.diagnose.channel import faults, not_of_the_motion
+from bench.diagnose.data import Data, prepare
+from bench.diagnose.diagnose import believed_structure
+from bench.diagnose.numbers import cause_of
+from bench.diagnose.refit import Fit, onto, refit
+from bench.diagnose.shapes import reshaped
+from bench.diagnose.spread import covariance, of_the_noise
+from sim.effects import effect
+from sim.model import Model
+from tests.bench.diagnose.small import measurement
+from tests.truth.cases import Case, draw_case
+
+
+@cache
+def fitted(id: str, shape: str, form: str, size: float = 1.0, seed: int = 1, **told: Any) -> tuple[Case, Data, Fit]:
+    """A hidden effect, and the fit of one form of it, from the true numbers."""
+    c = draw_case(seed, (id,), size, shape, **({"protocol": "rich", "rate_hz": 120.0, "jitter": "none"} | told))
+    m = measurement(c)
+    p = prepare(m, not_of_the_motion(m, faults(m.force_N)).good)
+    structure = believed_structure(Model.from_dict(c.believed), p)
+    cause = cause_of(effect(id), effect(id).form(form), c.truth.parameters[id])
+    joined = structure.with_cause(cause)
+    fit = refit(p.short, joined, joined.x(structure.pad.x()), 60, 1e-9)
+    return c, p.full, onto(fit, p.full)
+
+
+def stated(fit: Fit, name: str) -> tuple[float, float]:
+    """A number of the only cause, and its standard error by the fit's `spread`."""
+    cause, at = fit.structure.causes[0], fit.structure.of_cause(0)
+    k = [p.name for p in cause.fitted].index(name)
+    c = fit.structure.coordinates[at.start + k]
+    value = fit.structure.values(fit.x)[0][name]
+    return value, float(np.sqrt(fit.covariance()[at.start + k, at.start + k])) * (value if c.logarithmic else c.unit)
+
+
+@pytest.mark.parametrize(
+    ("id", "shape", "form", "name", "better"),
+    [
+        ("viscous_damping", "thinning", "linear", "coefficient", "power"),
+        ("viscous_damping", "one_sided", "linear", "coefficient", "one_sided"),
+        ("depth_dependent_relaxation", "knee", "linear", "slope", "knee"),
+        ("cogging", "iron", "sine", "period", "trailing"),
+        ("inertia", "cable_chain", "rigid", "mass", "growing"),
+        ("damage", "hyperbolic", "linear", "rate", "hyperbolic"),
+    ],
+)
+def test_another_shape_that_fits_better_takes_its_place(id: str, shape: str, form: str, name: str, better: str) -> None:
+    c, data, fit = fitted(id, shape, form)
+    again = reshaped(data, fit)
+    assert again.structure.causes[0].form.name == better
+    true = c.truth.parameters[id][name]
+    assert abs(stated(replace(again, spread=None), name)[0] / true - 1) < 0.1
+
+
+def test_the_best_shape_stays() -> None:
+    _, data, fit = fitted("damage", "exponential", "exponential")
+    assert reshaped(data, fit) is fit
+
+
+def test_shapes_that_serve_as_well_widen_what_is_stated() -> None:
+    """A small effect in noise: the shape cannot be told, and the numbers of the shapes differ."""
+    c, data, fit = fitted("force_drift", "turns", "linear", 0.3)
+    narrow, wide = (replace(fit, spread=s) for s in (of_the_noise(data, fit), covariance(data, fit)))
+    true = c.truth.parameters["force_drift"]["rate"]
+    value, error = stated(narrow, "rate")
+    assert abs(value - true) > 2 * abs(error)  # the straight line has the mean rate and not the first
+    assert abs(value - true) < 2 * abs(stated(wide, "rate")[1])
