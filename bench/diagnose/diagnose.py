@@ -17,7 +17,7 @@ from sim.model import Model
 from sim.pad import Pad
 
 from .channel import Faults, faults, not_of_the_motion, standing_off
-from .channel_causes import by_themselves, channel_causes, hum_cause
+from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS
 from .held_out import later_square
@@ -193,7 +193,7 @@ def _concluded(
     gains = [(a - b) / scale for a, b in zip(excess, excess[1:], strict=False)]
     causes = found(search, path, whole[1], gains)
     least = min(TOLD * scale, SPEAKS * floor**2)
-    causes += [replace(c, gain=c.gain / scale) for c in channel if c.gain > least or by_themselves(c)]
+    causes = joined(causes, [replace(c, gain=c.gain / scale) for c in channel if c.gain > least or by_themselves(c)])
     left = excess[-1] / scale if causes and np.isfinite(scale) else 1.0 - sum(c.gain for c in causes)
     tests = remains(full, residual, prepared.colour, whole[1].free, swing)
     told = [r for r in tests if r.passed]
