@@ -28,10 +28,16 @@ SETTLING = 20  # samples after a move that are not yet a hold
 CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
 NEARLY = 0.95  # of a ceiling
 CEILING = 8  # samples in a row at the greatest force
+CALMED, AMID = 9, 0.3  # samples over which, and share of the usual change of slope below which, the noise has gone
+TOP, DISTINCT = 0.8, 3  # of the greatest force: where a ceiling that gives way still is; and values that it passes
+FEW_BESIDE = 0.05  # of the samples at a ceiling that moves: so few others as high are at it too
+SLOWED = (2, 3, 4)  # samples that a channel says one value for, when it is for a while that much slower
 BESIDE = 5  # neighbours on either side that a stray sample is held against: bursts are shorter
 ASIDE, CALM = 8, 0.6  # neighbours on either side of a residual, and the share of them that a burst leaves alone
 FAR = 6.0  # noise deviations that an outlier stands off at the least
+FEW, ALONE = 3, 1.7  # outliers that are a fault; and times further off is one that is no fault, but no noise either
 BULK = 9.0  # medians of the size: within some six deviations of white noise
+DOUBT = 2.0  # of the logarithm of the likelihood of a tail: two standard deviations
 DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
 FALSE_SHARE, SEVERAL = 0.02, 10  # of values beyond the limit that may be noise, where at least so many lie there
 RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data; or chance of repeats
@@ -65,14 +71,28 @@ def faults(force_N: Array) -> Faults:
     if len(force_N) < 30:
         return Faults(none, none, none)
     saturated, limit = _ceiling(force_N)
+    yielding, top = _yielding(force_N)
+    saturated, limit = saturated | yielding, top if limit is None else limit
     # just below a ceiling that is not sharp a channel repeats itself too
     ended = saturated if limit is None else saturated | (force_N * np.sign(limit) > NEARLY * abs(limit))
-    stuck = _stuck(force_N, ended)
+    stuck = _stuck(force_N, ended) | _slowed(force_N, ended)
     halted, share = _halted(force_N, ended | stuck)
     if not stuck.any():
         stuck = halted
     outlier = _spikes(force_N, ~(saturated | stuck))
-    return Faults(saturated, stuck, outlier, limit, share if stuck is halted else None)
+    again = _stray_again(force_N, outlier, stuck)
+    return Faults(saturated, stuck & ~again, outlier | again, limit, share if stuck is halted else None)
+
+
+def _stray_again(force: Array, outlier: Mask, stuck: Mask) -> Mask:
+    """Stuck samples that say a stray value again, and samples with the one value that stray ones have where readings
+    have many digits: what is read when nothing is there."""
+    first, length = _runs(force)
+    again = np.repeat(outlier[first], length) & stuck
+    values, count = np.unique(force[outlier], return_counts=True)
+    if resolution(force) == 0.0 and _never_equal(force, int(count.max(initial=0))):
+        again |= np.isin(force, values[count >= FEW_REPEATS]) & ~outlier
+    return again
 
 
 def _runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -100,6 +120,69 @@ def _ceiling(force: Array) -> tuple[Mask, float | None]:
             mask |= sign * force >= top - 1e-9 * span
             return mask, sign * top
     return mask, None
+
+
+def _yielding(force: Array) -> tuple[Mask, float | None]:
+    """Samples at a ceiling that moves, as one that gives way under load does: near the greatest (or least) force, on
+    a path without the noise that there is elsewhere. The limit is the furthest of them.
+    """
+    mask, step = np.zeros(len(force), dtype=bool), resolution(force)
+    bend = np.abs(np.diff(force, 2))
+    usual = float(np.mean(np.minimum(bend, np.quantile(bend, 0.9))))
+    if usual == 0.0:
+        return mask, None
+    calm = np.zeros(len(force), dtype=bool)
+    calm[1:-1] = np.convolve(bend, np.ones(CALMED) / CALMED, mode="same") < AMID * usual
+    calm[: CALMED // 2 + 1] = calm[len(force) - CALMED // 2 - 1 :] = False
+    near = max(1.001 * step, AMID * usual)  # digits of a file are cut off
+    change = np.diff(force)
+    calm[1:] &= np.abs(change) <= near
+    for sign in (1.0, -1.0):
+        top = float((sign * force).max())
+        if top < 0.05 * float(np.ptp(force)):
+            continue
+        inside = (calm & (sign * force > TOP * top)).astype(np.int8)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]]))).reshape(-1, 2)
+        for first, last in edges.tolist():
+            core = force[first:last]
+            # a value that only stays the same sticks
+            if last - first < CEILING or len(np.unique(core)) < DISTINCT:
+                continue
+            quiet = float(np.mean(bend[first - 1 : last - 1])) / usual
+            if (last - first) * np.log(max(quiet, 1e-3)) > np.log(CHANCE) - 4.0:
+                continue  # noise is as quiet as that by chance
+            slope = float(np.median(np.diff(core))) if step == 0.0 else 0.0
+            while first > 0 and abs(change[first - 1] - slope) <= near:
+                first -= 1
+            while last < len(force) and abs(change[last - 1] - slope) <= near:
+                last += 1
+            mask[first:last] = True
+        if mask.any():
+            mask |= sign * force >= top - 1e-9 * float(np.ptp(force))
+            # where it bears for a moment only, its calm does not show
+            beyond = sign * force >= float((sign * force[mask]).min())
+            return (mask | beyond if (beyond & ~mask).sum() <= FEW_BESIDE * mask.sum() else mask), sign * top
+    return mask, None
+
+
+def _slowed(force: Array, but: Mask) -> Mask:
+    """Samples that say again what the channel said before, for a while every other one or all but every so many."""
+    mask, same = np.zeros(len(force), dtype=bool), np.concatenate([[False], force[1:] == force[:-1]])
+    # where it repeats itself the most anyway: in holds
+    window = min(max(len(force) // 40, 20), len(force))
+    shares = np.convolve(same & ~but, np.ones(window) / window, mode="valid")
+    chance = min(max(float(np.quantile(shares, 0.9)), 0.05), 0.97)
+    for every in SLOWED:
+        least = int(np.ceil(np.log(CHANCE / len(force)) / np.log(chance) / (every - 1))) + 1
+        for phase in range(every):
+            count = (len(force) - phase) // every
+            group = np.arange(phase, phase + count * every).reshape(count, every)
+            again = np.all(same[group[:, 1:]] & ~but[group[:, 1:]], axis=1).astype(np.int8)
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], again, [0]]))).reshape(-1, 2)
+            for first, last in edges[np.diff(edges, axis=1)[:, 0] >= least].tolist():
+                if np.mean(same[group[first:last, 0]]) < 0.5 * (1.0 + chance):  # else it is one long run
+                    mask[group[first:last, 1:].ravel()] = True
+    return mask
 
 
 def _stuck(force: Array, but: Mask) -> Mask:
@@ -190,8 +273,15 @@ def _spikes(force: Array, good: Mask) -> Mask:
     off = np.abs(y - middle)
     quiet = reach <= np.quantile(reach, 0.5)  # in holds the differences are noise alone
     limit = max(far((y - middle)[quiet]), FAR * noise)
-    mask[index[off > limit + 2.0 * reach]] = True
+    mask[index[_beyond(off, np.full(len(y), limit), 2.0 * reach)]] = True
     return mask
+
+
+def _beyond(off: Array, limit: Array, reach: Array) -> Mask:
+    """Which distances (n,) are beyond a limit (n,) and what the neighbours differ by (n,): of one or two alone those
+    that are far beyond, as the tail of noise is not known that well, and the noise of a channel often has one."""
+    beyond = off > limit + reach
+    return beyond if beyond.sum() >= FEW else beyond & (off > ALONE * limit + reach)
 
 
 def far(values: Array) -> float:
@@ -212,7 +302,10 @@ def far(values: Array) -> float:
     within = np.asarray(student_t.cdf(edges / scale[..., None], degrees[..., None]))
     shares = np.diff(within, axis=-1) / (within[..., -1:] - 0.5)
     likelihood = np.sum(counts * np.log(np.maximum(shares, 1e-300)), axis=-1)
-    best = np.unravel_index(int(np.argmax(likelihood)), likelihood.shape)
+    # of the tails that the bulk allows the heaviest, with the scale that suits it
+    allowed_tails = np.flatnonzero(likelihood.max(axis=1) >= likelihood.max() - DOUBT)
+    heaviest = int(allowed_tails[0])
+    best = heaviest, int(np.argmax(likelihood[heaviest]))
     # beyond it noise alone puts less than one value in a hundred such data, or a small share of those that lie there
     unit = q50 * float(scale[best])
     beyond = np.sort(size[size > FAR * unit])[::-1] / unit
@@ -256,5 +349,6 @@ def standing_off(residual: Array, good: Mask, suspect: Mask) -> Mask:
     calm = np.quantile(np.abs(around - middle), CALM, axis=0)
     limit = far(e - middle)
     limits = np.where(suspect[index], 0.5, 1.0) * limit
-    mask[index[np.abs(e - middle) > limits + 3.0 * np.maximum(calm - float(np.median(calm)), 0.0)]] = True
+    reach = 3.0 * np.maximum(calm - float(np.median(calm)), 0.0)
+    mask[index[_beyond(np.abs(e - middle), limits, reach)]] = True
     return mask

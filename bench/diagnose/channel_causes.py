@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,15 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
                 share, among = flags.stuck_share, max(round(count / flags.stuck_share), 1)
             numbers = {"fraction": Number(share, "1", float(np.sqrt(share * (1 - share) / among)))}
         out.append(_named(id_, effect(id_).forms[0].name, numbers, float(np.sum(error[mask] ** 2)) / n))
+    return out
+
+
+def joined(causes: Sequence[CauseFound], channel: Sequence[CauseFound]) -> list[CauseFound]:
+    """Causes of a model in their order, and those of the channel, each before the first that takes less than it."""
+    out = list(causes)
+    for cause in sorted(channel, key=lambda c: c.gain, reverse=True):
+        at = next((k for k, other in enumerate(out) if other.gain < cause.gain), len(out))
+        out.insert(at, cause)
     return out
 
 

@@ -17,7 +17,7 @@ from sim.model import Model
 from sim.pad import Pad
 
 from .channel import Faults, faults, not_of_the_motion, standing_off
-from .channel_causes import by_themselves, channel_causes, hum_cause
+from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS
 from .held_out import later_square
@@ -204,7 +204,7 @@ def _concluded(
     residual = raw.force_N - after
     swing = _swinging(prepared, residual)
     if swing is not None:
-        floor, squares, excess = _apart(prepared, swing, residual, floor, squares, excess)
+        floor, squares, excess = _apart(prepared, swing, floor, squares, excess)
     channel = channel_causes(m, prepared, flags, before, whole[1])
     apart = sum(c.gain for c in channel)  # still in N²
     scale = excess[0] + apart
@@ -213,7 +213,7 @@ def _concluded(
     gains = [(a - b) / scale for a, b in zip(excess, excess[1:], strict=False)]
     causes = found(search, path, whole[1], gains)
     least = min(TOLD * scale, SPEAKS * floor**2)
-    causes += [replace(c, gain=c.gain / scale) for c in channel if c.gain > least or by_themselves(c)]
+    causes = joined(causes, [replace(c, gain=c.gain / scale) for c in channel if c.gain > least or by_themselves(c)])
     left = excess[-1] / scale if causes and np.isfinite(scale) else 1.0 - sum(c.gain for c in causes)
     tests = remains(full, residual, whole[1].free, swing)
     told = [r for r in tests if r.passed]
@@ -262,18 +262,19 @@ def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:
 
 
 def _apart(
-    prepared: Prepared, swing: Swing, residual_N: Array, floor_N: float, squares: list[float], excess: list[float]
+    prepared: Prepared, swing: Swing, floor_N: float, squares: list[float], excess: list[float]
 ) -> tuple[float, list[float], list[float]]:
-    """Noise floor, N, held-out squares and their excesses over it, N², with what swings: the holds took it for noise,
-    but for a line that was taken out before.
+    """Noise floor, N, held-out squares and their excesses over it, N², with what swings: as far as the holds took it
+    for noise, and the line that was taken out before.
+
+    Noise is no more than what stands beside the swing, and no less than the floor's own share of that.
     """
-    weight = prepared.full.weight
-    swings = swing.share * float(np.sum(weight * residual_N**2) / weight.sum())
     line = 0.0
     if prepared.hum is not None and not prepared.hum.of_the_mains:
         line = 0.5 * prepared.hum.amplitude_N**2 * (1.0 + prepared.hum.ratio**2)
-    noise = max(floor_N**2 - max(swings - line, 0.0), 1e-6 * floor_N**2)
-    return float(np.sqrt(noise)), [s + line for s in squares], [e + swings for e in excess]
+    noise = float(np.clip(swing.beside_N2, (1.0 - swing.share) * floor_N**2, floor_N**2))
+    taken = floor_N**2 - noise + line
+    return float(np.sqrt(noise)), [s + line for s in squares], [e + taken for e in excess]
 
 
 def _ranking(path: Path) -> list[Alternative]:

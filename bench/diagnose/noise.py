@@ -1,7 +1,12 @@
 """How noisy the force is, sample by sample, and how much neighbouring samples say the same thing.
 
 σ² = σ_F² + (K σ_x)²: the force's own noise, and what is left of the position's through the local stiffness. The colour
-is that of a Gauss–Markov process with white noise beside it, ρ_k = a φ^k, matched in the holds.
+is that of a Gauss–Markov process with white noise beside it, ρ_k = a φ^k.
+
+Both are matched to how far the means of three neighbouring stretches of a hold are off a line, stretches of 1, 2, 4 …
+samples (the three-sample variance of clocks: R. A. Baugh, Proc. 25th Freq. Control Symp., 1971, 222–225). Noise does
+not change in the course of a run, has no power that rises with frequency, and forgets within `MEMORY_S`. What knocks
+for a while, swings or wanders in the holds is none, and is told from it by that.
 """
 
 from __future__ import annotations
@@ -10,16 +15,29 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 from scipy.signal import lfilter
+from scipy.stats import chi2 as chi2_law
 
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
-LONGEST = 2000  # samples of a hold that are looked at
+LONGEST = 4000  # samples of a hold that are looked at
 LEAST = 12
 MEMORY_S = 0.15  # correlation time beyond which it is no noise, but structure
+SLOWER_S, SMOOTHER_S = (0.6, 2.5), (0.1, 0.5)  # memory of what wanders, and of what wanders without kinks
+SWINGS_HZ, SWINGS_S = np.geomspace(1.0, 16.0, 9), 4.0  # what swings, and how long it keeps its phase
+REACH_S = 0.6  # of the longest stretches that are compared
+LEVELS = 12
+WINDOW_S, SHORTEST = 0.4, 24  # in which noise is compared with noise; samples
+CHANCE = 1e-3  # that a window of noise alone is left out
+TAILS = 1.5  # times more than Gaussian noise does a window of heavy-tailed noise vary
+STEADY = 0.02  # relative doubt of every level: no noise is exactly of this form
+MISFIT = 2.0  # times better must colour make the fit of noise with structure beside it
+COLOURED, PAYS = 3.0, 20.0  # twice the log-likelihood by which colour, and structure beside the noise, must better it
 
 
 @dataclass(frozen=True)
@@ -48,7 +66,7 @@ Part = tuple[Array, Array, Array]
 """Of one hold: stamps, errors about a smooth curve, and the orthonormal basis that was taken out."""
 
 
-def hold_errors(m: Measurement, good: NDArray[np.bool_]) -> list[Part]:
+def hold_errors(m: Measurement, good: Mask) -> list[Part]:
     """What smooth curves leave of the force samples (m,) that are `good`, hold by hold."""
     parts: list[Part] = []
     for stretch in holds(m.position_time_s, m.position_mm):
@@ -63,7 +81,7 @@ def hold_errors(m: Measurement, good: NDArray[np.bool_]) -> list[Part]:
     return parts
 
 
-def force_noise(m: Measurement, good: NDArray[np.bool_]) -> ForceNoise:
+def force_noise(m: Measurement, good: Mask) -> ForceNoise:
     """Of the force samples (m,) that are `good`, about smooth curves through the holds."""
     parts = [(e, Q) for _, e, Q in hold_errors(m, good)]
     if sum(len(e) for e, _ in parts) < 40:
@@ -83,53 +101,150 @@ def _about_curve(t: Array, y: Array) -> tuple[Array, Array]:
     return left - Q @ (Q.T @ left), Q
 
 
-def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
-    """σ, a and φ for which what the projection leaves has the autocovariance found."""
-    longest = max(len(e) for e, _ in parts)
-    lags = np.unique(np.concatenate([[0, 1, 2, 3, 5, 8], np.geomspace(10, 200, 8)]).astype(np.intp))
-    lags = lags[lags < max(longest // 3, 2)]
-    found = np.zeros(len(lags))
-    for e, _ in parts:
-        found += [float(e[: len(e) - k] @ e[k:]) if k < len(e) else 0.0 for k in lags]
-    sizes = np.array([sum(max(len(e) - k, 0) for e, _ in parts) for k in lags], dtype=np.float64)
-    white = np.array([_expected(parts, lags, 0.0)]).ravel()
-    sigma2 = found[0] / white[0]
-    left = found / sizes
-    best = (np.inf, 0.0, 0.0, sigma2)
-    if len(lags) > 3 and abs(left[1]) > 3.0 * left[0] / np.sqrt(sizes[1]):
-        slowest = float(np.exp(-sample_s / MEMORY_S))
-        for phi in 1.0 - np.geomspace(0.6, max(1.0 - slowest, 1e-4), 28):
-            tail = _expected(parts, lags, float(phi))
-            A = np.stack([white, tail], axis=1) / sizes[:, None]
-            weight = np.sqrt(sizes / sizes[0])
-            solution = np.linalg.lstsq(A * weight[:, None], left * weight, rcond=None)[0]
-            nugget, coloured = max(float(solution[0]), 0.0), max(float(solution[1]), 0.0)
-            error = float(np.sum((weight * (A @ [nugget, coloured] - left)) ** 2))
-            if error < best[0]:
-                best = (error, float(phi), coloured / max(nugget + coloured, 1e-300), nugget + coloured)
-    _, phi, share, sigma2 = best
-    return ForceNoise(float(np.sqrt(max(sigma2, 1e-300))), Colour(share, phi) if share > 0.02 else Colour(), True)
+def _bent(values: Array, m: int) -> Array:
+    """Of values (n, …), (n − 3m + 1, …): the mean of m neighbours less twice the next m's, and that of the m after."""
+    total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    means = (total[m:] - total[:-m]) / m
+    return np.asarray(means[: -2 * m] - 2.0 * means[m:-m] + means[2 * m :])
 
 
-def _expected(parts: list[tuple[Array, Array]], lags: NDArray[np.intp], phi: float) -> Array:
-    """Σ over the parts of E[ê_i ê_{i+k}] for unit noise of ρ_k = φ^k, ê what the projection leaves."""
-    out = np.zeros(len(lags))
-    for e, Q in parts:
-        n = len(e)
-        if phi > 0.0:  # R Q by two recursions
+@dataclass(frozen=True)
+class _Level:
+    """Stretches of `m` samples: squares (k,) and the window (k,) of each; by part, the basis bent like the errors."""
+
+    m: int
+    square: Array
+    window: NDArray[np.intp]
+    bent: list[Array]
+
+
+def _levels(parts: list[tuple[Array, Array]], sample_s: float) -> list[_Level]:
+    longest, out = max(len(e) for e, _ in parts), []
+    width = max(round(WINDOW_S / sample_s), SHORTEST)
+    for m in [2**k for k in range(LEVELS)]:
+        if 4 * m > longest or (m > 4 and m * sample_s > REACH_S):
+            break
+        squares, windows, bent, before = [], [], [], 0
+        for e, Q in parts:
+            count, n = max(len(e) // width, 1), len(e) - 3 * m + 1
+            if 4 * m <= len(e):
+                squares.append(_bent(e, m) ** 2)
+                windows.append(before + np.minimum((np.arange(n) + 3 * m // 2) * count // len(e), count - 1))
+                bent.append(_bent(Q, m))
+            else:
+                bent.append(np.zeros((0, Q.shape[1])))
+            before += count
+        out.append(_Level(m, np.concatenate(squares), np.concatenate(windows), bent))
+    return out
+
+
+def _plain(m: int, phi: complex) -> float:
+    """E of a square for unit noise of ρ_k = Re φ^k."""
+    if phi == 0.0:
+        return 6.0 / m
+    k = np.arange(1, m)
+    own = m + 2.0 * np.sum((m - k) * phi**k)
+    reach = (1.0 - phi**m) / (1.0 - phi)
+    return float(np.real(6.0 * own - 8.0 * phi * reach**2 + 2.0 * phi ** (m + 1) * reach**2)) / m**2
+
+
+def _expected(parts: list[tuple[Array, Array]], levels: list[_Level], phi: complex) -> list[Array]:
+    """By level, E of each square (k,) for unit noise of ρ_k = Re φ^k, of which the projections took their part."""
+    out: list[list[Array]] = [[] for _ in levels]
+    for number, (_, Q) in enumerate(parts):
+        RQ = Q
+        if phi != 0.0:  # R Q by two recursions
             forward = lfilter([1.0], [1.0, -phi], Q, axis=0)
             backward = lfilter([1.0], [1.0, -phi], Q[::-1], axis=0)[::-1]
-            RQ = forward + backward - Q
-        else:
-            RQ = Q
+            RQ = np.asarray(np.real(forward + backward)) - Q
         inner = Q.T @ RQ
-        for j, k in enumerate(lags):
-            if k >= n:
-                continue
-            plain = (n - k) * phi**k if phi > 0 else (float(n) if k == 0 else 0.0)
-            cross = float(np.sum(RQ[: n - k] * Q[k:])) + float(np.sum(Q[: n - k] * RQ[k:]))
-            out[j] += plain - cross + float(np.sum((Q[: n - k] @ inner) * Q[k:]))
+        for level, own in zip(levels, out, strict=True):
+            bent = level.bent[number]
+            if len(bent):
+                own.append(np.einsum("ij,ij->i", bent, bent @ inner - 2.0 * _bent(RQ, level.m)))
+    return [np.concatenate(own) + _plain(level.m, phi) for level, own in zip(levels, out, strict=True)]
+
+
+def _steady(level: _Level, white: Array, windows: int) -> Mask:
+    """Windows (windows,) that are no louder than noise is that does not change, by one level of detail."""
+    n = np.bincount(level.window, minlength=windows)
+    there = n > 0
+    powers = np.bincount(level.window, level.square, windows), np.bincount(level.window, white, windows)
+    loud = powers[0][there] / powers[1][there]
+    freedom = np.maximum(n[there] / _together(level.m), 1.0)
+    usual = float(np.median(loud / (chi2_law.median(freedom) / freedom)))
+    freedom = np.maximum(freedom / TAILS, 1.0)
+    kept = np.ones(windows, dtype=bool)
+    kept[there] = loud <= usual * np.asarray(chi2_law.isf(CHANCE, freedom)) / freedom
+    return kept
+
+
+def _together(m: int) -> float:
+    """Neighbouring squares that say as much as one, of white noise: Σ of their squared correlations."""
+    return 0.78 * m + 1.16
+
+
+def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
+    """σ, a and φ under which the squares found are likeliest."""
+    levels = _levels(parts, sample_s)
+    white = _expected(parts, levels, 0.0)
+    windows = 1 + max(int(level.window.max()) for level in levels)
+    keep = np.logical_and.reduce([_steady(level, w, windows) for level, w in zip(levels, white, strict=True)])
+    at = [keep[level.window] for level in levels]
+    counts = np.array([a.sum() / _together(level.m) for a, level in zip(at, levels, strict=True)])
+
+    def mean(values: list[Array]) -> Array:
+        return np.array([v[a].mean() for v, a, n in zip(values, at, counts, strict=True) if n >= 3.0])
+
+    def tail(memory_s: float, frequency_Hz: float = 0.0) -> Array:
+        turn = np.exp(-sample_s / memory_s + 2j * np.pi * frequency_Hz * sample_s)
+        return mean(_expected(parts, levels, complex(turn) if frequency_Hz else float(turn.real)))
+
+    plain, found, counts = mean(white), mean([level.square for level in levels]), counts[counts >= 3.0]
+    if len(found) < 3:
+        return ForceNoise(float(np.sqrt(max(found[0] / plain[0], 1e-300))), Colour(), True)
+    weight = 1.0 / (1.0 / counts + STEADY**2)
+    memories = [0.0, *np.geomspace(0.5 * sample_s, max(MEMORY_S, sample_s), 20).tolist()]
+    noises = [[plain] if memory == 0.0 else [plain, tail(memory)] for memory in memories]
+    best = _best(memories, noises, [], found, weight)
+    if best[0] > PAYS:
+        beside = [tail(memory) for memory in SLOWER_S]
+        # (1 + x) e^−x
+        beside += [tail(memory) + (tail(1.05 * memory) - tail(0.95 * memory)) / 0.1 for memory in SMOOTHER_S]
+        beside += [tail(SWINGS_S, f) for f in SWINGS_HZ if f * sample_s < 0.1]
+        # no structure has just these forms: colour must take a good part of what they leave
+        other = _best(memories[:1], noises[:1], beside, found, weight)
+        coloured = _best(memories, noises, beside, found, weight)
+        other = coloured if coloured[0] * MISFIT + COLOURED < other[0] else other
+        best = other if other[0] + PAYS < best[0] else best
+    _, memory, own, carried = best
+    sigma2 = max(own + carried, 1e-300)
+    share = carried / sigma2
+    phi = float(np.exp(-sample_s / memory)) if memory else 0.0
+    return ForceNoise(float(np.sqrt(sigma2)), Colour(share, phi) if share > 0.02 else Colour(), True)
+
+
+def _best(
+    memories: list[float], noises: list[list[Array]], beside: list[Array], found: Array, weight: Array
+) -> tuple[float, float, float, float]:
+    """(deviance, memory in s, white and coloured power) of the noise that does best with what is beside."""
+    out = (np.inf, 0.0, 0.0, 0.0)
+    for memory, noise in zip(memories, noises, strict=True):
+        amounts, deviance = _likeliest(np.stack([*noise, *beside], axis=1), found, weight)
+        deviance += COLOURED * (len(noise) - 1)
+        if deviance < out[0]:
+            out = (deviance, memory, float(amounts[0]), float(amounts[1]) if len(noise) > 1 else 0.0)
     return out
+
+
+def _likeliest(columns: Array, found: Array, weight: Array) -> tuple[Array, float]:
+    """(amounts ≥ 0 of columns (k, p) for mean squares `found` (k,) that scatter by √(2/weight), deviance)."""
+    expected, amounts = found, np.zeros(columns.shape[1])
+    for _ in range(6):
+        scale = np.sqrt(weight) / expected
+        amounts = np.asarray(nnls(columns * scale[:, None], found * scale)[0])
+        expected = np.maximum(columns @ amounts, 1e-6 * found)
+    return amounts, float(np.sum(weight * (np.log(expected / found) + found / expected - 1.0)))
 
 
 def _from_motion(y: Array) -> float:

@@ -10,22 +10,26 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_law
 
 Array = NDArray[np.float64]
 
 LOWEST_HZ = 1.5
 SPARED = 24  # ordinates of lowest frequency: there the numbers fitted, and slow drifts, have a say
 FEWEST, BANDS_PER_OCTAVE = 12, 10  # ordinates of a band, and how narrow bands are where there are enough
-RISE = 3.0  # times the least of the bands below it that a peak is high
+GROUND = 3  # neighbouring bands whose mean is the noise around a peak, where it is least below the peak
+RISE, CHANCE = 3.0, 1e-4  # times that, at the least, that a peak is high; and of a band so high, of a ground so low
 LEAST_SHARE = 0.15  # of the power
 
 
 @dataclass(frozen=True)
 class Swing:
-    """`frequency_Hz` of the peak, and the `share` of the power that stands above the noise around it."""
+    """`frequency_Hz` of the peak; the `share` of the power that stands above the noise around it; and the mean square
+    `beside_N2` of what does not: of all that is as quick as swings can be."""
 
     frequency_Hz: float
     share: float
+    beside_N2: float
 
 
 def find(time_s: Array, error_N: Array, sample_s: float) -> Swing | None:
@@ -45,20 +49,23 @@ def find(time_s: Array, error_N: Array, sample_s: float) -> Swing | None:
     level = np.add.reduceat(power, edges[:-1])[: len(count)] / count if len(edges) else power
     level[-1] = power[edges[-2] : edges[-1]].mean()
     above = np.zeros(len(level))
-    least, sure = level[0], count[0]
-    for k in range(1, len(level)):
-        # a mean of n ordinates scatters by 1/√n; of many bands the least lies lower still
-        doubt = 1.0 + 5.0 / np.sqrt(count[k]) + 3.0 / np.sqrt(sure)
-        if level[k] > max(RISE, doubt) * least:
-            above[k] = (level[k] - least) * count[k]
-        if level[k] < least:
-            least, sure = level[k], count[k]
+    # the least of three neighbouring bands together: of many single ones some lie low by chance
+    kernel = np.ones(GROUND)
+    together = np.convolve(count, kernel, "valid")
+    ground = np.convolve(level * count, kernel, "valid") / together
+    for k in range(GROUND, len(level)):
+        low = int(np.argmin(ground[: k - GROUND + 1]))
+        chance = np.asarray(chi2_law.isf(CHANCE, 2 * count[k])) / (2 * count[k])
+        chance /= np.asarray(chi2_law.ppf(CHANCE, 2 * together[low])) / (2 * together[low])
+        if level[k] > max(RISE, float(chance)) * ground[low]:
+            above[k] = (level[k] - ground[low]) * count[k]
     share = float(above.sum() / max(power[first:].sum(), 1e-300))
     if share < LEAST_SHARE:
         return None
     k = int(np.argmax(np.where(above > 0, level, 0.0)))
     at = edges[k] + int(np.argmax(power[edges[k] : edges[k + 1]]))
-    return Swing(float(frequency[at]), share)
+    beside = (1.0 - share) * 2.0 * float(power[first:].sum()) / len(grid) / len(error_N)
+    return Swing(float(frequency[at]), share, beside * len(power) / (len(power) - first))
 
 
 def _edges(first: int, last: int) -> NDArray[np.intp]:

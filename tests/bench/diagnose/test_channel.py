@@ -8,6 +8,9 @@ from scipy.signal import lfilter
 
 from bench.diagnose import hum, swing
 from bench.diagnose.channel import faults
+from bench.diagnose.channel_causes import joined
+from bench.diagnose.result import CauseFound
+from tests.truth.cases import draw_case
 
 SAMPLE_s = 0.002
 SEEDS = range(12)
@@ -43,6 +46,67 @@ def test_repeats_in_a_coarse_channel_are_told_by_how_often_they_come():
         assert not (found.stuck & ~repeats).any()
 
 
+def _scored(said: np.ndarray, true: np.ndarray) -> tuple[float, float]:
+    """(precision, recall) of samples (n,)."""
+    hits = float((said & true).sum())
+    return hits / max(said.sum(), 1), hits / true.sum()
+
+
+def test_a_value_that_comes_twice_for_a_while_sticks_in_a_coarse_channel_too():
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        force = _steps(rng, 0.01, 0.012)
+        assert not faults(force).stuck.any()
+        stuck = np.zeros(len(force), dtype=bool)
+        stuck[5001:5401:2] = stuck[15_001:15_201:2] = True
+        force[stuck] = force[np.flatnonzero(stuck) - 1]
+        precision, recall = _scored(faults(force).stuck, stuck)
+        assert precision > 0.95
+        assert recall > 0.95
+
+
+@pytest.mark.parametrize("kind", ["white", "coloured", "quantised", "heavy"])
+def test_a_ceiling_that_gives_way_is_a_ceiling(kind):
+    """Its samples follow each other without noise, and none of them is the greatest twice."""
+    said, true = [], []
+    for seed in (1, 2, 3, 4):
+        told = {"noise_kind": kind, "own_clock": False, "rate_hz": 400.0}
+        case = draw_case(seed, ("saturation",), 1.5, "sags", **told)
+        found = faults(case.force_N)
+        said.append(found.saturated)
+        true.append(case.truth.flags["saturated"])
+        assert found.limit_N == pytest.approx(case.truth.parameters["saturation"]["limit"], rel=0.01)
+        assert found.stuck.sum() < 0.01 * true[-1].sum()
+        assert not faults(draw_case(seed, (), **told).force_N).saturated.any()
+    precision, recall = _scored(np.concatenate(said), np.concatenate(true))
+    assert precision > 0.9
+    assert recall > 0.8
+
+
+def test_a_frame_that_is_lost_twice_in_a_row_is_stray_and_not_stuck():
+    for seed in (1, 2, 3):
+        case = draw_case(seed, ("outliers",), 2.0, "dropouts", noise_kind="white", own_clock=False)
+        force, stray = case.force_N.copy(), case.truth.flags["outlier"].copy()
+        again = np.flatnonzero(stray[:-1] & ~stray[1:])[:6] + 1  # the frame after it is lost as well
+        force[again], stray[again] = 0.0, True
+        found = faults(force)
+        assert not found.stuck.any()
+        precision, recall = _scored(found.outlier, stray)
+        assert precision > 0.95
+        assert recall > 0.95
+
+
+def test_the_tail_of_heavy_noise_is_no_fault():
+    """One value in ten thousand far out is what such noise does, now and then."""
+    flagged = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        force = _steps(rng, 1e-7, 0.0)
+        force = force + 0.01 * rng.standard_t(5.0, len(force))
+        flagged += bool(faults(force).outlier.any())
+    assert flagged <= 1
+
+
 @pytest.mark.parametrize(("frequency_Hz", "sample_s", "mains"), [
     (50.0, 0.001, True), (60.02, 0.001, True), (100.0, 0.002, True), (150.0, 0.001, True),
     (8.0, 0.001, False), (23.0, 0.001, False), (75.0, 0.001, False),
@@ -70,3 +134,11 @@ def test_what_sways_at_a_frequency_of_its_own_is_seen_and_noise_is_not():
         assert found is not None
         assert found.frequency_Hz == pytest.approx(5.0, rel=0.1)
         assert found.share == pytest.approx(1.5**2 / (1.0 + 1.5**2), abs=0.12)
+
+
+def test_a_fault_of_the_channel_stands_where_what_it_takes_puts_it():
+    def cause(id: str, gain: float) -> CauseFound:
+        return CauseFound(id, "", {}, gain, 1.0, [], "", "")
+
+    model, channel = [cause("friction", 0.1), cause("backlash", 0.3)], [cause("stuck_samples", 0.0), cause("hum", 0.6)]
+    assert [c.id for c in joined(model, channel)] == ["hum", "friction", "backlash", "stuck_samples"]

@@ -1,0 +1,76 @@
+"""The noise floor: what is noise in the holds, and what only looks like it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bench.diagnose import swing
+from bench.diagnose.channel import faults
+from bench.diagnose.diagnose import _apart
+from bench.diagnose.noise import force_noise
+from bench.recording.types import Measurement
+from tests.truth.cases import Case, draw_case
+
+SEEDS = (1, 2, 3)
+
+
+def _told(case: Case) -> float:
+    """Noise told over noise put in."""
+    assert case.force_time_s is None
+    time, first = np.unique(case.time_s, return_index=True)
+    force = case.force_N[first]
+    m = Measurement("case", time, case.position_mm[first], time, force)
+    return force_noise(m, faults(force).good).force_N / case.truth.noise.std
+
+
+@pytest.mark.parametrize("kind", ["white", "coloured", "quantised", "heavy"])
+def test_noise_of_any_kind_is_told_by_the_holds(kind):
+    for seed in SEEDS:
+        assert _told(draw_case(seed, (), noise_kind=kind, own_clock=False)) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("id", "shape"), [
+    ("knocks", "thump"),  # in some holds, for a while
+    ("knocks", "table"),
+    ("rocking_bench", "one_way"),  # swings after each move, at a few Hz
+    ("rocking_bench", "two_ways"),
+    ("loose_cable", "two_level"),  # jumps
+    ("probe_tilt", "reseats"),
+])  # fmt: skip
+def test_what_moves_in_the_holds_and_is_no_noise_is_kept_out_of_the_noise(id, shape):
+    for seed in SEEDS:
+        case = draw_case(seed, (id,), 1.0, shape, noise_kind="white", own_clock=False)
+        assert _told(case) == pytest.approx(1.0, abs=0.15)
+
+
+def test_noise_does_not_swing_however_few_its_samples_are():
+    for seed in range(60):
+        noise = np.round(np.random.default_rng(seed).standard_normal(2500))
+        assert swing.find(0.008 * np.arange(2500), noise, 0.008) is None
+
+
+def test_what_stands_beside_a_swing_is_told():
+    rng, t = np.random.default_rng(5), 0.002 * np.arange(20_000)
+    turn = np.exp((-0.02 + 1j) * 2.0 * np.pi * 5.0 * 0.002)
+    state, sway = 0j, np.zeros(len(t))
+    for k in range(len(t)):
+        state = turn * state + rng.standard_normal() + 1j * rng.standard_normal()
+        sway[k] = state.real
+    found = swing.find(t, 0.3 * rng.standard_normal(len(t)) + 2.0 * sway / sway.std(), 0.002)
+    assert found is not None
+    assert 0.06 < found.beside_N2 < 0.1 * 2.0**2
+
+
+@pytest.mark.parametrize(("beside_N2", "floor_N"), [
+    (4.0, 1.0),  # far more is left than noise, in which something swings besides: the floor is what it was
+    (0.5, np.sqrt(0.5)),  # the holds took the swing for noise
+    (0.0, np.sqrt(0.4)),  # and no more of the floor can have swung than its share
+])  # fmt: skip
+def test_a_swing_takes_from_the_floor_what_the_floor_held_of_it(beside_N2, floor_N):
+    floor, squares, excess = _apart(SimpleNamespace(hum=None), swing.Swing(5.0, 0.6, beside_N2), 1.0, [9.0], [8.0])
+    assert floor == pytest.approx(floor_N)
+    assert squares == [9.0]
+    assert excess[0] == pytest.approx(9.0 - floor**2)
