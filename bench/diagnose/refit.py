@@ -63,8 +63,10 @@ def force_at(data: Data, structure: Structure, x: Array) -> Array:
     """Simulated force on the grid (n,), N; not finite where the numbers make no plant."""
     position = data.position_mm + structure.surface_mm(x)
     with np.errstate(all="ignore"):
-        force = structure.cascade(x).simulate(data.time_s, position) + structure.offset_N(x)
-    return force if data.tared is None else force - float(np.mean(force[data.tared]))
+        force = structure.cascade(x).simulate(data.time_s, position)
+    # the tare takes the pad's own force at that time off, and leaves its own error, which is the offset
+    zero_N = 0.0 if data.tared is None else float(np.mean(force[data.tared]))
+    return np.asarray(force - zero_N + structure.offset_N(x))
 
 
 def errors(data: Data, structure: Structure, x: Array) -> Array:
