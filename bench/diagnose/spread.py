@@ -46,7 +46,8 @@ def _of_the_shapes(data: Data, fit: Fit, own: Array) -> Array:
     """What the choice among shapes that the data cannot tell apart adds to the variances of x (P,).
 
     Each shape of a cause's family weighs as its χ² tells it (K. P. Burnham, D. R. Anderson, Model Selection and
-    Multimodel Inference, 2nd ed., Springer, 2002, section 4.3, with Schwarz's weights).
+    Multimodel Inference, 2nd ed., Springer, 2002, section 4.3, with Schwarz's weights). A shape whose numbers the data
+    cannot tell says no more about another's than that one itself does.
     """
     out = np.zeros(len(fit.x))
     short, lead, kept = stand_in(data, fit)
@@ -66,7 +67,8 @@ def _of_the_shapes(data: Data, fit: Fit, own: Array) -> Array:
             for w, m in zip(weight[1:], members[1:], strict=True):
                 there = m.values[p.name]
                 away = np.log(max(there, 1e-300) / here) if c.logarithmic else (there - here) / c.unit
-                out[position] += w * float(away**2 + max(wider * m.variances[p.name] - own[position], 0.0))
+                more = min(max(wider * m.variances[p.name] - own[position], 0.0), own[position])
+                out[position] += w * float(away**2 + more)
     return out
 
 
