@@ -27,6 +27,7 @@ from .refit import Fit, extended, force_at, mean_square, onto, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
 from .search import Path, Search
+from .shapes import reshaped
 from .spread import covariance
 from .swing import Swing
 from .swing import find as swinging
@@ -65,7 +66,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     prepared = search.prepared
     prepared, flags, search, path = _asked_again(m, prepared, flags, search, path)
     base, final = path.fits[0], path.fits[-1]
-    final = ordered(prepared, final, base)
+    final = ordered(prepared, reshaped(prepared.full, final, len(base.structure.causes)), base)
     tell("predicting what was held out")
     fits = chain(prepared, final, base)
     floor = _floor(prepared, final)
