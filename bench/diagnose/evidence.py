@@ -13,6 +13,7 @@ from .refit import Fit
 LEVEL = 0.01  # of a false alarm over all that is tried
 TRIED = 150.0  # candidates with their starts, as independent tries
 CRUMB = 0.002  # of the noise power: what is smaller is no finding
+LONGEST = 0.99  # of the longest period that is sought
 BEYOND = 3.0  # standard deviations of touch-off and tare, within which neither is found wrong
 MOST_LEFT, SPEAKS = 0.6, 0.02  # of what is left, and of the noise power: a cause beside a far larger one takes so much
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
@@ -105,6 +106,8 @@ def believable(fit: Fit, prepared: Prepared) -> bool:
         if abs(values[name]) < BEYOND * std:
             return False
     for p in cause.form.parameters:
+        if p.name == "period" and values[p.name] > LONGEST * p.upper:
+            return False  # of a longer wave the data hold too little: it is anything that bends
         if p.floor is not None and abs(values[p.name]) < p.floor[1] * limits[p.floor[0]]:
             return False
     return True

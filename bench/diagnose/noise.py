@@ -200,10 +200,10 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
         turn = np.exp(-sample_s / memory_s + 2j * np.pi * frequency_Hz * sample_s)
         return mean(_expected(parts, levels, complex(turn) if frequency_Hz else float(turn.real)))
 
-    plain, found, counts = mean(white), mean([level.square for level in levels]), counts[counts >= 3.0]
+    plain, found = mean(white), mean([level.square for level in levels])
     if len(found) < 3:
         return ForceNoise(float(np.sqrt(max(found[0] / plain[0], 1e-300))), Colour(), True)
-    weight = 1.0 / (1.0 / counts + STEADY**2)
+    weight = 1.0 / (1.0 / counts[counts >= 3.0] + STEADY**2)
     memories = [0.0, *np.geomspace(0.5 * sample_s, max(MEMORY_S, sample_s), 20).tolist()]
     noises = [[plain] if memory == 0.0 else [plain, tail(memory)] for memory in memories]
     best = _best(memories, noises, [], found, weight)

@@ -6,11 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from bench.diagnose import swing
 from bench.diagnose.channel import faults
 from bench.diagnose.diagnose import _apart
-from bench.diagnose.noise import force_noise
+from bench.diagnose.noise import _about_curve, _matched, force_noise
 from bench.recording.types import Measurement
 from tests.truth.cases import Case, draw_case
 
@@ -74,3 +75,16 @@ def test_a_swing_takes_from_the_floor_what_the_floor_held_of_it(beside_N2, floor
     assert floor == pytest.approx(floor_N)
     assert squares == [9.0]
     assert excess[0] == pytest.approx(9.0 - floor**2)
+
+
+def test_levels_of_detail_that_few_samples_tell_are_left_out():
+    """Holds of some tens of samples, coloured so that every kind of noise is tried."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        parts = []
+        for n in (int(rng.integers(14, 40)), int(rng.integers(14, 40)), int(rng.integers(14, 60))):
+            e = lfilter([1.0], [1.0, -0.7], rng.standard_normal(n))
+            t = np.arange(n) * 0.01
+            parts.append(_about_curve(t, e))
+        found = _matched(parts, 0.01)
+        assert np.isfinite(found.force_N) and found.force_N > 0.2
