@@ -17,7 +17,7 @@ from typing import Literal
 import yaml
 
 from bench.config import Bench
-from bench.errors import InputError, Stopped
+from bench.errors import InputError, Refused, Stopped
 from bench.plan import Plan
 from bench.protocol import Protocol
 from bench.rates import force_rate_Hz, motor_rate_Hz
@@ -103,7 +103,8 @@ def run_protocol(
         force_Hz = force_rate_Hz(bench, protocol.sampling.load_cell)
         motor_Hz = motor_rate_Hz(bench, protocol.sampling.motor)
         path, per_s = folder / RECORDING, force_Hz + motor_Hz
-        with Recorder(path, rig.clock, mode=mode, planned_s=planned_s, samples_per_s=per_s) as recorder:
+        made = Recorder(path, rig.clock, mode=mode, planned_s=planned_s, samples_per_s=per_s)
+        with _kept_once_begun(made) as recorder:
             recorder.begin(
                 _run_record(protocol, bench, notes or Notes()),
                 _host_record(),
@@ -174,6 +175,17 @@ def _run(
     if failure is not None:
         raise failure
     return Outcome(folder, cause or problem, run.found, seconds, loop.motor_count, loop.force_count)
+
+
+@contextmanager
+def _kept_once_begun(recorder: Recorder) -> Iterator[Recorder]:
+    """Takes the recording of a run away again where no device was reached: nothing was measured."""
+    try:
+        with recorder:
+            yield recorder
+    except (InputError, Refused):
+        recorder.path.unlink(missing_ok=True)
+        raise
 
 
 def _wind_down(loop: Loop, run: Run, cause: str) -> None:

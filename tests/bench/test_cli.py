@@ -17,7 +17,7 @@ import yaml
 
 from bench import cli
 from bench.recording import read_recording
-from bench.run.folder import make_folder
+from bench.run.folder import own_folder
 from tests.bench.run.benches import SHORT, bench_file, merged, protocol_file
 from tests.bench.said import AIR, FIT, Said
 
@@ -147,9 +147,13 @@ def test_a_terminal_that_is_closed_meanwhile_costs_nothing(padbench, tmp_path, m
 
 def test_folders_of_one_second_are_numbered(padbench):
     now = datetime.datetime(2026, 11, 21, 10, 15)
-    names = [make_folder("quick", None, now).name for _ in range(3)]
+    names = []
+    for _ in range(3):
+        with own_folder("quick", None, now) as folder:
+            names.append(folder.name)
     assert names == [f"2026-11-21_101500_quick{tail}" for tail in ("", "_2", "_3")]
-    assert make_folder("quick", Path("a/b"), now) == Path("a/b") and Path("a/b").is_dir()
+    with own_folder("quick", Path("a/b"), now) as folder:
+        assert folder == Path("a/b") and folder.is_dir()
 
 
 def test_a_stopped_run_keeps_data_and_says_why(padbench, tmp_path):
