@@ -24,7 +24,7 @@ from bench.rates import force_rate_Hz, motor_rate_Hz
 from bench.recording.unfinished import Left
 from bench.recording.writer import Recorder
 from bench.run.axis import Axis
-from bench.run.folder import RECORDING
+from bench.run.folder import MODEL, RECORDING
 from bench.run.foresight import Foresight
 from bench.run.loop import Loop
 from bench.run.rig import Rig, is_simulated, open_rig
@@ -33,6 +33,7 @@ from bench.run.script import Findings, Run
 from bench.run.signals import SIGNALS as SIGNALS
 from bench.run.signals import Operator, listening
 from bench.run.touchoff import warm_up
+from bench.yamlfile import parse, validate
 from drivers.errors import DriverError
 
 HOST_PACKAGES = ("padbench", "numpy", "scipy", "numba", "pymodbus", "pyserial", "mcap")
@@ -223,7 +224,8 @@ def _foresight(believed_text: str | None, plan: Plan) -> Foresight | None:
         return None
     from sim.model import Model
 
-    return Foresight(Model.from_dict(yaml.safe_load(believed_text)), plan.limits)
+    believed = validate(parse(believed_text, Path(MODEL)), Model)  # as every other command reads it
+    return Foresight(believed, plan.limits)
 
 
 def _as_sampled(bench: Bench, protocol: Protocol) -> Bench:
