@@ -6,6 +6,7 @@ fault; a prediction takes the pad model (a force beyond the limit) and is an ans
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -195,8 +196,20 @@ def _worst(outcomes: Iterable[Outcome], key: Callable[[Outcome], float]) -> list
 
 
 def _forces(planned: Plan, outcomes: tuple[Outcome, ...]) -> Iterator[Problem]:
-    """Steps that go beyond a limit; not those that only come back from there."""
+    """Steps that go beyond a limit; not those that only come back from there. What is no number is beyond each."""
     limits = planned.limits
+    finite = [math.isfinite(o.peak_N) and math.isfinite(o.least_N) for o in outcomes]
+    lost = [o for o, known in zip(outcomes, finite, strict=True) if not known]
+    for outcome in _worst(lost, lambda o: o.deepest_mm):
+        yield Problem(
+            outcome.segment.name,
+            f"the pad model gives no finite force at up to {outcome.deepest_mm:.3g} mm: nothing can be held to "
+            f"limits.force {limits.force_N:g} N",
+            kind="prediction",
+            cure="the model's elastic law is far too steep for this motion: see that it is the pad's",
+            path=outcome.segment.path,
+        )
+    outcomes = tuple(o for o, known in zip(outcomes, finite, strict=True) if known)
     pressed = (o for o in outcomes if o.peak_N > max(limits.force_N, o.start_N) + TOLERANCE)
     for outcome in _worst(pressed, lambda o: o.peak_N):
         segment = outcome.segment

@@ -10,6 +10,7 @@ from bench.commands.options import add_columns, must_be_writable, read_data
 from bench.errors import EXIT_DONE, InputError
 
 if TYPE_CHECKING:
+    from bench.recording.types import Array
     from sim.model import Model
 
 
@@ -48,10 +49,20 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
     for problem in preflight.errors:
         print(f"note: on bench '{args.bench}' this would be refused: {problem}")
     prediction = preflight.prediction
+    _must_be_finite(args.model, prediction.force_N)
     time_s = prediction.time_s
     write_csv(args.out, time_s, prediction.position_mm, time_s, prediction.force_N)
     print(f"wrote {args.out}: {time_s.size} samples over {time_s[-1]:.1f} s")
     return EXIT_DONE
+
+
+def _must_be_finite(model: str, force_N: Array) -> None:
+    import numpy as np
+
+    lost = np.count_nonzero(~np.isfinite(force_N))
+    if lost:
+        what = f"gives no finite force over this motion ({lost} of {force_N.size} samples)"
+        raise InputError(model, what, "its elastic law is far too steep for it: see that model and motion belong together")
 
 
 def _over_data(args: argparse.Namespace, model: Model) -> int:
@@ -64,6 +75,7 @@ def _over_data(args: argparse.Namespace, model: Model) -> int:
     t, x, force_t = measured.position_time_s, measured.position_mm, measured.force_time_s
     like = likeness(model, measured)
     force = like.force_N
+    _must_be_finite(args.model, force)
     if force_t.size == t.size and not np.array_equal(force_t, t):
         # Two clocks with a force for every position: row by row as the data have it.
         write_csv(args.out, t, x, t, force, extra={"force_time_s": (t, force_t)})

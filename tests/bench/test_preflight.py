@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from bench.config import Bench, load_bench, load_model
-from bench.errors import InputError, Refused
+from bench.errors import InputError, Refused, Stopped
 from bench.plan import allowed_force_speed, plan
 from bench.preflight import Preflight, check
 from bench.protocol import Protocol, load_protocol
 from bench.rates import force_latency_s, force_rate_Hz, motor_rate_Hz
+from bench.run.foresight import Foresight
 from bench.shipped import shipped_names
+from bench.trajectory import Profile
 from sim.model import Model
 
 LINEAR_N_mm = 4.0
@@ -303,3 +305,32 @@ def test_the_summary_has_a_row_a_step(bench: Bench) -> None:
     assert all(len(line) <= 90 for line in lines[:20])
     row = next(line for line in lines if line.startswith("steps[3].cycle[*].steps[0]"))
     assert row.split()[1:5] == ["4", "1.4", "mm", "20"]
+
+
+# -- a force that is no number ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("relaxation", [{}, {"shares": [0.25], "rates": [4.0]}])
+def test_a_pad_whose_force_is_no_number_is_refused(tmp_path: Path, bench: Bench, relaxation: Any) -> None:
+    """With modes infinity less infinity is no number, and no number is greater than a limit."""
+    steep = model({"law": "exponential", "m": 2.0, "b": 1e6}, **relaxation)
+    found = check(protocol(tmp_path, "{to: 1.0, speed: 40}", head="limits: {force: 9}\n"), bench, steep)
+    assert isinstance(found.refusal(), Refused) and "no finite force" in refusal(found)
+
+
+def test_nothing_is_simulated_with_a_force_that_is_no_number(padbench, csv) -> None:
+    Path("steep.yaml").write_text(
+        "pad:\n  elastic: {law: exponential, m: 2, b: 1e6}\n  relaxation: {shares: [0.25], rates: [4.0]}\n"
+    )
+    for motion in (("--like", csv), ("--protocol", "quick")):
+        said = padbench("simulate", "steep.yaml", *motion, "--out", "out.csv")
+        assert said.status == 2 and "no finite force" in said.err and not Path("out.csv").exists()
+
+
+def test_a_foreseen_force_that_is_no_number_stops_the_run(tmp_path: Path, bench: Bench) -> None:
+    planned = check(protocol(tmp_path, "{to: 1.0, speed: 40}", head="limits: {force: 9}\n"), bench).plan
+    steep = model({"law": "exponential", "m": 2.0, "b": 1e6}, shares=[0.25], rates=[4.0])
+    foresight = Foresight(steep, planned.limits)
+    foresight.start(0.0)
+    with pytest.raises(Stopped, match="not begun"):
+        foresight.allow("steps[0]", Profile(-0.1, 1.0, 40.0, 1000.0))
