@@ -15,6 +15,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NoReturn
 
+from bench.commands.outputs import check_outputs
 from bench.errors import EXIT_BAD_INPUT, EXIT_DEFECT, EXIT_NO, PadbenchError
 
 COMMANDS = {
@@ -129,6 +130,7 @@ def main(argv: list[str] | None = None) -> int:
         top.print_help(sys.stderr)
         return EXIT_BAD_INPUT
     try:
+        check_outputs(args)
         return int(_module(args.command).main(args))
     except PadbenchError as error:
         print(f"padbench {args.command}: {error}", file=sys.stderr)

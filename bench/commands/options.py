@@ -69,19 +69,6 @@ def pads(recordings: list[Recording]) -> list[Measurement]:
     return [recording.measurement() for recording in recordings]
 
 
-def must_be_writable(path: str | Path | None) -> None:
-    """Raises `InputError` where a file cannot be written: said before the work whose result is to go there."""
-    if path is None or str(path) == "-":
-        return
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(str(path), "is a folder, not a file to write", "name a file in it")
-    if not path.parent.is_dir():
-        raise InputError(str(path), f"cannot be written: there is no folder {path.parent}", "make it, or name another")
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InputError(str(path), "cannot be written: permission denied", "name a place that is yours")
-
-
 def say_plan(preflight: Preflight) -> None:
     """What the protocol will do, on standard output; raises what stands against it, which is said there alone."""
     refusal = preflight.refusal()

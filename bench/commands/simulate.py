@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.commands.options import add_columns, must_be_writable, read_data
+from bench.commands.options import add_columns, read_data
+from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE, InputError
 
 if TYPE_CHECKING:
@@ -24,14 +25,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--bench", default="simulated", metavar="BENCH", help="with --protocol (default: %(default)s)")
     add_columns(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="CSV", help="file to write")
+    add_output(parser, "--out", kinds=("csv",), type=Path, required=True, metavar="CSV", help="file to write")
 
 
 def main(args: argparse.Namespace) -> int:
     """Simulate and write CSV; with --like, also say how far the simulation is from the data."""
     from bench.config import load_model
 
-    must_be_writable(args.out)
     model = load_model(args.model)
     return _over_protocol(args, model) if args.protocol else _over_data(args, model)
 
@@ -62,7 +62,9 @@ def _must_be_finite(model: str, force_N: Array) -> None:
     lost = np.count_nonzero(~np.isfinite(force_N))
     if lost:
         what = f"gives no finite force over this motion ({lost} of {force_N.size} samples)"
-        raise InputError(model, what, "its elastic law is far too steep for it: see that model and motion belong together")
+        raise InputError(
+            model, what, "its elastic law is far too steep for it: see that model and motion belong together"
+        )
 
 
 def _over_data(args: argparse.Namespace, model: Model) -> int:
