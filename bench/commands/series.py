@@ -57,7 +57,6 @@ def main(args: argparse.Namespace) -> int:
             f"bench '{series.bench.name}' is real hardware, and nobody is said to stand at it\n"
             "  stand there, a hand at its emergency stop, and add --attended (or dry-run it with --simulated)"
         )
-    state = read_state(series, changed=args.changed)
 
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True) if quiet else say(text)
@@ -82,11 +81,12 @@ def main(args: argparse.Namespace) -> int:
         progress=lambda: Progress(preflight.duration_s + preflight.approach_s),
         by_itself=args.yes,
     )
-    try:
-        whole = work.measure(series, preflight, state, person, tuple(args.redo))
-    finally:
-        found = series_table.rows(series, state)
-        if series.out.is_dir():
+    with work.held(series.out):
+        state = read_state(series, changed=args.changed)
+        try:
+            whole = work.measure(series, preflight, state, person, tuple(args.redo))
+        finally:
+            found = series_table.rows(series, state)
             series_table.write(series, found)
     left = [row["id"] for row in found if row["status"] not in ("done", "skipped")]
     lines = [*series_table.lines(found), f"table: {series.out / series_table.TABLE}"]
