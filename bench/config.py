@@ -32,7 +32,7 @@ from sim.faults import FaultError, fault_schema, read_faults
 if TYPE_CHECKING:
     from sim.model import Model
 
-DEFAULT_PAD = "polyurethane"
+DEFAULT_BENCH, DEFAULT_PAD = "simulated", "polyurethane"
 
 
 class _Part(BaseModel):
@@ -207,9 +207,10 @@ class Bench(_Part):
                 raise FieldError(("limits", what), message, "the limit must protect the load cell: lower it")
 
 
-def load_bench(name_or_path: str | Path = "simulated") -> Bench:
-    """A bench by file or shipped name; raises `InputError`."""
-    document = read_yaml(find_file("bench", name_or_path))
+def load_bench(name_or_path: str | Path | None = None) -> Bench:
+    """A bench by file or shipped name; raises `InputError`. None: the shipped simulated one, whatever files there are."""
+    default = find_shipped("bench", DEFAULT_BENCH) if name_or_path is None else None
+    document = read_yaml(default or find_file("bench", name_or_path or DEFAULT_BENCH))
     bench = validate(document, Bench)
     bench = bench.model_copy(update={key: _with_map(bench, key, document) for key in ("motor", "load_cell")})
     bench._text, bench._source, bench._places = document.text, document.path, document.places

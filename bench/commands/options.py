@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 def add_bench(parser: argparse.ArgumentParser) -> None:
     """`--bench` and `--pad`."""
-    parser.add_argument(
-        "--bench", default="simulated", metavar="BENCH", help="bench file or shipped name (default: %(default)s)"
-    )
+    parser.add_argument("--bench", metavar="BENCH", help="bench file or shipped name (default: simulated, as shipped)")
     parser.add_argument(
         "--pad", metavar="MODEL", help="the pad as the lab believes it to be: model file or shipped name"
     )

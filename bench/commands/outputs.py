@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bench.errors import InputError
+from bench.shipped import KINDS, shipped_names
 
 Kind = Literal["csv", "mcap", "json", "yaml", "html", "c"]
 
@@ -69,6 +70,7 @@ def check_outputs(args: argparse.Namespace) -> None:
         path = Path(value)
         must_be_writable(path)
         _must_end_well(output, path)
+        _must_not_shadow(output, path)
         read = [file for name, file in _files(args) if name not in (*outputs, output.edits)]
         if any(_same(path, file) for file in read):
             raise InputError(output.name, f"{path} is an input of this command", "name another file to write")
@@ -96,6 +98,14 @@ def _must_end_well(output: Output, path: Path) -> None:
     if ending in others:
         usual = " or ".join(ENDINGS[kind][0] for kind in output.kinds)
         raise InputError(output.name, f"{path}: what is written there is no {ending} file", f"let it end in {usual}")
+
+
+def _must_not_shadow(output: Output, path: Path) -> None:
+    """A file named as something shipped would from then on be taken for it, by every command given there."""
+    for kind in KINDS:
+        if path.name in shipped_names(kind):
+            what = f"{path} is the name of a shipped {kind}, which stays as it is"
+            raise InputError(output.name, what, "give the file an ending, or another name")
 
 
 def _files(args: argparse.Namespace) -> Iterator[tuple[str, Path]]:

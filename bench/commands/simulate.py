@@ -23,7 +23,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     motion.add_argument(
         "--like", type=Path, metavar="DATA", help="the measured motion of a recording, run folder or CSV"
     )
-    parser.add_argument("--bench", default="simulated", metavar="BENCH", help="with --protocol (default: %(default)s)")
+    parser.add_argument("--bench", metavar="BENCH", help="with --protocol (default: simulated, as shipped)")
     add_columns(parser)
     add_output(parser, "--out", kinds=("csv",), type=Path, required=True, metavar="CSV", help="file to write")
 
@@ -45,9 +45,10 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
     protocol = load_protocol(args.protocol)
     if protocol.in_air:
         raise InputError(args.protocol, "presses no pad (`approach: none`)", "name a protocol with an approach")
-    preflight = check(protocol, load_bench(args.bench), model)
+    bench = load_bench(args.bench)
+    preflight = check(protocol, bench, model)
     for problem in preflight.errors:
-        print(f"note: on bench '{args.bench}' this would be refused: {problem}")
+        print(f"note: on bench '{bench.name}' this would be refused: {problem}")
     prediction = preflight.prediction
     _must_be_finite(args.model, prediction.force_N)
     time_s = prediction.time_s

@@ -68,6 +68,29 @@ def test_what_is_read_and_what_was_measured_are_not_overwritten(lab, words):
     assert contents() == before
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "doctor simulated --yes --write simulated",
+        "fit good.csv --write polyurethane",
+        "diagnose good.csv --model m.yaml --next quick",
+        "check quick --plot run3/simulated",
+    ],
+)
+def test_nothing_is_written_under_the_name_of_something_shipped(lab, words):
+    before = contents()
+    said = lab(*words.split())
+    assert said.status == 2 and "is the name of a shipped" in said.err
+    assert contents() == before
+
+
+def test_the_default_bench_is_the_shipped_one_whatever_stands_there(lab):
+    shipped = lab("check", "quick", "--bench", find_file("bench", "simulated"))
+    Path("simulated").write_text("name: mine\n")
+    assert lab("check", "quick") == shipped and shipped.status == 0
+    assert lab("check", "quick", "--bench", "simulated").status == 2
+
+
 def test_a_product_may_be_written_anew(lab):
     """A second time to the same place, beside a folder's recording, and where nothing stood."""
     for _ in range(2):
