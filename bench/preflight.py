@@ -18,7 +18,7 @@ from bench.config import Bench
 from bench.errors import InputError, PadbenchError, Refused
 from bench.places import Key
 from bench.plan import Plan, Problem, Segment, plan
-from bench.predict import Prediction, predict
+from bench.predict import LONGEST_S, Prediction, TooLong, predict
 from bench.protocol import Approach, Protocol
 from bench.rates import force_rate_Hz, motor_rate_Hz
 
@@ -108,12 +108,18 @@ def check(
     """Plan the protocol, simulate it on the believed pad, and say what stands against it.
 
     `surface_mm` (motor frame) is the surface once it is known: travel is then checked exactly, before only its span.
-    `latency_s` and `noise_N` as for `bench.plan.plan`.
+    `latency_s` and `noise_N` as for `bench.plan.plan`. Raises `InputError` where the steps take more than a week.
     """
     if protocol.in_air:
         believed = None  # there is nothing for it to be
     planned = plan(protocol, bench, believed, latency_s=latency_s, noise_N=noise_N)
-    prediction = predict(planned, believed)
+    try:
+        prediction = predict(planned, believed)
+    except TooLong as long:
+        segment = planned.segments[long.index]
+        what = f"{segment.name}: with this the steps take {long.total_s:.3g} s, more than a week ({LONGEST_S:g} s)"
+        cure = "times are in seconds, speeds in mm/s: shorten it, or make several protocols"
+        raise InputError(protocol.place(segment.path), what, cure) from None
     outcomes = _outcomes(prediction)
     problems = list(planned.problems)
     problems += _travel(planned, outcomes, surface_mm)

@@ -334,3 +334,29 @@ def test_a_foreseen_force_that_is_no_number_stops_the_run(tmp_path: Path, bench:
     foresight.start(0.0)
     with pytest.raises(Stopped, match="not begun"):
         foresight.allow("steps[0]", Profile(-0.1, 1.0, 40.0, 1000.0))
+
+
+# -- without end -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("steps", "head", "line"),
+    [
+        (["{to: 1, speed: 5}", "{to: 2, speed: 5, hold: 1e12}"], "", 4),
+        (["{to: 2, speed: 5, hold: 1e10}"], "", 3),
+        (["{to: 2, speed: 1e-8}"], "", 3),
+        (["{to_force: 2, speed: 1e-9}"], "limits: {depth: 2.5}\n", 4),
+        (["{to_force: 2, speed: 1, hold: 1e11, hold_mode: force}"], "limits: {depth: 2.5}\n", 4),
+        (["{to: 1, speed: 5}"], "finish: {air: 1e12}\n", 2),
+        (["{block: day, repeat: 30, steps: [{to: 1, speed: 5, hold: 86400}]}"], "", 3),
+    ],
+)
+def test_more_than_a_week_is_refused_where_it_stands(tmp_path, bench, steps, head, line) -> None:
+    """Whether it is one wait, a motion that hardly moves, or what is repeated."""
+    with pytest.raises(InputError, match="more than a week") as refused:
+        check(protocol(tmp_path, *steps, head=head), bench, model())
+    assert f"p.yaml:{line}:" in str(refused.value)
+
+
+def test_a_day_of_waiting_is_a_protocol(tmp_path: Path, bench: Bench) -> None:
+    assert check(protocol(tmp_path, "{to: 1, speed: 5, hold: 86400}"), bench).duration_s > 86400
