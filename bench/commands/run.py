@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from bench.commands.options import add_bench, say, say_plan, status
 from bench.commands.progress import Progress
-from bench.errors import EXIT_DONE, EXIT_NO, InputError, Refused
+from bench.errors import EXIT_DONE, EXIT_NO, InputError, Refused, Stopped
 
 if TYPE_CHECKING:
     from bench.config import Bench
@@ -85,8 +85,14 @@ def main(args: argparse.Namespace) -> int:
 def _after(outcome: Outcome, prediction: Prediction, believed: Model | None) -> None:
     from bench.results import analyse
 
-    with status("fitting the pad's model") as progress:
-        results = analyse(outcome.folder, prediction=prediction, believed=believed, progress=progress)
+    try:
+        with status("fitting the pad's model") as progress:
+            results = analyse(outcome.folder, prediction=prediction, believed=believed, progress=progress)
+    except KeyboardInterrupt:
+        raise Stopped(
+            "stopped by the operator (Ctrl-C) while the model was fitted\n"
+            f"  the recording is whole: `padbench report {outcome.folder}` fits it and writes the rest"
+        ) from None
     for line in results.lines():
         say(line)
     say(f"report: {results.report}")

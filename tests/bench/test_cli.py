@@ -364,3 +364,25 @@ def test_schema_is_json(padbench, kind):
     said = padbench("schema", kind)
     assert said.status == 0
     assert json.loads(said.out)["type"] == "object"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("words", [["check", "quick"], ["check", "--list"], ["schema", "protocol"]])
+def test_a_full_disk_behind_standard_output_is_no_defect(tmp_path, words):
+    """Little is written when the interpreter ends, much before: both are said, once."""
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "bench.cli", *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 2 and "cannot be written: No space left on device" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_ctrl_c_while_the_model_is_fitted_says_where_the_recording_is(padbench, tmp_path, monkeypatch):
+    def struck(*given, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bench.results.analyse", struck)
+    said = padbench("run", protocol_file(tmp_path, AIR), "--out", "out")
+    assert said.status == 1 and "Ctrl-C" in said.err and "`padbench report out`" in said.err
+    assert Path("out/recording.mcap").is_file()
