@@ -31,12 +31,13 @@ def main(args: argparse.Namespace) -> int:
         return _list()
     if args.protocol is None:
         raise InputError("PROTOCOL", "which one?", "give a file or a shipped name (`padbench check --list`)")
-    from bench.config import load_bench, load_model
+    from bench.config import load_bench, load_model, ports_agree
     from bench.preflight import check
     from bench.protocol import load_protocol
 
     protocol = load_protocol(args.protocol)
     bench = load_bench(args.bench)
+    ports_agree(bench)
     preflight = check(protocol, bench, load_model(args.pad) if args.pad else None)
     if args.plot is not None:  # drawn where it is refused as well: it shows why
         from bench.planview import plan_view
