@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from bench.commands.outputs import add_output
 from bench.daily.words import add_arguments, agreed, bench_of, positive, put_out
-from bench.errors import EXIT_DONE, EXIT_NO, InputError
+from bench.errors import EXIT_DONE, EXIT_NO, InputError, PadbenchError
 
 if TYPE_CHECKING:
     from bench.config import Bench
@@ -45,14 +45,23 @@ def main(args: argparse.Namespace) -> int:
 
         own_file(bench.source, bench.name)
     from bench.daily import doctor
+    from bench.daily.checkup.finding import Checkup
     from bench.daily.open_bench import OpenBench
 
     with OpenBench(bench) as work:
         wishes = doctor.Wishes(
             args.seconds, args.force_cap, args.press, lambda question: agreed(question, yes=args.yes, must_say=True)
         )
-        checkup = doctor.examine(work, wishes)
+        checkup, failure = Checkup(), None
+        try:
+            doctor.examine(work, wishes, checkup)
+        except PadbenchError as error:
+            failure = error
     lines = [line for finding in checkup.findings for line in finding.lines()]
+    if failure is not None:  # what was found until then is worth as much as before
+        shown = {"bench": bench.name, **checkup.to_json(), "well": False, "stopped": str(failure), "written": None}
+        put_out(args, [*lines, "the check-up did not come to its end"], shown)
+        raise failure
     found = doctor.measured_delay(checkup)
     figures: dict[str, Any] = {"bench": bench.name, **checkup.to_json(), "written": None}
     if args.write is not None:

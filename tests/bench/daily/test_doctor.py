@@ -238,3 +238,14 @@ def test_an_answer_that_is_none_is_not_taken_for_a_no(padbench, monkeypatch, ans
     monkeypatch.setattr("sys.stdin", io.StringIO("perhaps\n"))
     said = padbench("doctor", "simulated", "--seconds", "1")
     assert said.status == 1 and "nobody answers" in said.err and "motor.direction" not in said.out
+
+
+def test_what_was_found_before_a_failure_is_told_with_it(padbench, tmp_path):
+    """There is no pad to press: rates, noise and the rest were measured all the same."""
+    path = bench_file(tmp_path, simulation={"surface": 1000.0})
+    said = padbench("doctor", path, "--yes", "--press", "--seconds", "3", "--json", "found.json")
+    assert said.status == 1 and "no contact" in said.err
+    assert "motor rate: " in said.out and "did not come to its end" in said.out
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert "no contact" in found["stopped"] and not found["well"]
+    assert found["figures"]["noise"]["rms_N"] == pytest.approx(0.01, rel=0.1)
