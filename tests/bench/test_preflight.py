@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from bench.run.foresight import Foresight
 from bench.shipped import shipped_names
 from bench.trajectory import Profile
 from sim.model import Model
+from tests.bench.run.benches import bench_file
 
 LINEAR_N_mm = 4.0
 
@@ -360,3 +362,24 @@ def test_more_than_a_week_is_refused_where_it_stands(tmp_path, bench, steps, hea
 
 def test_a_day_of_waiting_is_a_protocol(tmp_path: Path, bench: Bench) -> None:
     assert check(protocol(tmp_path, "{to: 1, speed: 5, hold: 86400}"), bench).duration_s > 86400
+
+
+# -- rates that a run could not live with --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("sampling", "words"), [("{motor: 0.001}", "a motor sample every 1e.06 ms"), ("{load_cell: 2}", "make no tare")]
+)
+def test_rates_with_which_a_run_would_stop(tmp_path: Path, bench: Bench, sampling: str, words: str) -> None:
+    found = check(protocol(tmp_path, "{to: 1, speed: 5}", head=f"sampling: {sampling}\n"), bench, model())
+    error = found.refusal()
+    assert isinstance(error, InputError) and re.search(words, str(error)) and "p.yaml:2:" in str(error)
+
+
+@pytest.mark.parametrize(("speed", "passes"), [(5, True), (80, False)])
+def test_a_streamed_motor_that_hears_too_seldom(tmp_path: Path, speed: float, passes: bool) -> None:
+    """28 bytes of 11 bits at 19 200 baud are 16 ms at the least: 80 mm/s are 1.3 mm then, 0.5 mm allowed."""
+    slow = load_bench(bench_file(tmp_path, motor={"baudrate": 19200}))
+    found = check(protocol(tmp_path, f"{{to: 2, speed: {speed}}}", head="limits: {force: 15}\n"), slow, model())
+    assert (found.refusal() is None) == passes
+    assert passes or "behind: limits.following_error is 0.5 mm" in refusal(found)
