@@ -66,7 +66,7 @@ def main(args: argparse.Namespace) -> int:
 
         try:
             with status(f"fitting {folder.name}", quiet=quiet) as progress:
-                results = analyse(folder, believed=series.believed, progress=progress)
+                results = analyse(folder, believed=series.believed, structure=series.structure, progress=progress)
         except PadbenchError as error:
             tell(f"{folder.name}: no fit: {error}")
             return

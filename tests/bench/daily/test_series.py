@@ -182,6 +182,20 @@ def test_two_series_on_one_list_do_not_measure_together(padbench, tmp_path, monk
     assert statuses(path) == {"pad-1": "done"}
 
 
+def test_every_pad_is_fitted_with_the_structure_of_the_list(padbench, tmp_path):
+    """Of its own this pad is found to have another: pads compare in one structure only."""
+    path = list_file(tmp_path, samples=PADS[:1], law="power", order=1, contact="bonded")
+    assert padbench("series", path, "--yes").status == 0
+    fit = json.loads((tmp_path / "out/pad-1/fit.json").read_text())
+    assert (fit["law"], fit["order"], fit["contact"]) == ("power", 1, "bonded")
+
+
+@pytest.mark.parametrize("wrong", [{"law": "square"}, {"order": 0}, {"order": "two"}, {"contact": "glued"}])
+def test_a_structure_that_is_none_is_refused_before_anything_is_measured(padbench, tmp_path, wrong):
+    said = padbench("series", list_file(tmp_path, **wrong), "--yes")
+    assert said.status == 2 and f"{next(iter(wrong))}:" in said.err and not (tmp_path / "out").exists()
+
+
 def test_a_stopped_run_is_done_anew_from_its_beginning_and_both_are_kept(tmp_path):
     path = list_file(tmp_path, samples=PADS[:1])
     made, said, fitted = person(["go", "redo", "go"], stopping({0}))
