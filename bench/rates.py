@@ -92,12 +92,15 @@ def too_rare(bench: Bench, device: Literal["motor", "load_cell"], asked_Hz: floa
 
 
 def too_far_behind(bench: Bench, speed_mm_s: float, asked_Hz: float | None = None) -> str | None:
-    """What is wrong with a speed: a streamed motor stands a period behind its command, which alone may be too far."""
-    period_s, allowed_mm = 1.0 / motor_rate_Hz(bench, asked_Hz), bench.limits.following_error
-    behind_mm = speed_mm_s * period_s
-    if not streams(bench) or behind_mm <= allowed_mm or period_s > bench.limits.stale:  # that is said by itself
+    """What is wrong with a speed: a motor streamed slower than it should be stands a period behind its command.
+
+    None where nothing is, or where the motor hears as often as it should: how well it follows then a run will tell.
+    """
+    rate_Hz, allowed_mm = motor_rate_Hz(bench, asked_Hz), bench.limits.following_error
+    behind_mm = speed_mm_s / rate_Hz
+    if not streams(bench) or rate_Hz >= STREAM_HZ or behind_mm <= allowed_mm or too_rare(bench, "motor", asked_Hz):
         return None
-    told = f"at {speed_mm_s:.3g} mm/s a motor that is told a position every {1e3 * period_s:.3g} ms"
+    told = f"at {speed_mm_s:.3g} mm/s a motor that is told a position every {1e3 / rate_Hz:.3g} ms"
     return f"{told} is {behind_mm:.2g} mm behind: limits.following_error is {allowed_mm:g} mm"
 
 
