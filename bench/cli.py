@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import difflib
+import errno
 import importlib
 import io
 import os
@@ -15,6 +17,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NoReturn
 
+from bench.commands.outputs import check_outputs
 from bench.errors import EXIT_BAD_INPUT, EXIT_DEFECT, EXIT_NO, PadbenchError
 
 COMMANDS = {
@@ -46,6 +49,9 @@ EPILOG = """\
 PROTOCOL, BENCH and MODEL are files, or names of shipped ones (`padbench check --list`).
 Exit status: 0 done; 1 the answer is no, or the run was stopped (data kept); 2 bad input; 3 recovered with loss;
 70 a defect of padbench. Software limits are no emergency stop: keep one in reach."""
+
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
@@ -129,7 +135,10 @@ def main(argv: list[str] | None = None) -> int:
         top.print_help(sys.stderr)
         return EXIT_BAD_INPUT
     try:
-        return int(_module(args.command).main(args))
+        check_outputs(args)
+        status = int(_module(args.command).main(args))
+        sys.stdout.flush()  # what cannot be written is said here, not at the interpreter's end
+        return status
     except PadbenchError as error:
         print(f"padbench {args.command}: {error}", file=sys.stderr)
         return error.status
@@ -140,6 +149,8 @@ def main(argv: list[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_NO
     except OSError as error:
+        if error.filename is None and error.errno in NO_ROOM:
+            return _no_room(args.command, error)
         if error.filename is None:
             return _defect(args.command, error)
         print(f"padbench {args.command}: {error.filename}: {error.strerror}", file=sys.stderr)
@@ -150,6 +161,14 @@ def main(argv: list[str] | None = None) -> int:
 
 def _module(name: str) -> Any:
     return importlib.import_module(f"bench.commands.{name}")
+
+
+def _no_room(command: str, error: OSError) -> int:
+    """A stream of ours (standard output) goes where nothing can be written: what it still holds is given up."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    print(f"padbench {command}: what it says cannot be written: {error.strerror}", file=sys.stderr)
+    return EXIT_BAD_INPUT
 
 
 def _defect(command: str, error: Exception) -> int:

@@ -32,7 +32,7 @@ from sim.faults import FaultError, fault_schema, read_faults
 if TYPE_CHECKING:
     from sim.model import Model
 
-DEFAULT_PAD = "polyurethane"
+DEFAULT_BENCH, DEFAULT_PAD = "simulated", "polyurethane"
 
 
 class _Part(BaseModel):
@@ -155,8 +155,7 @@ class Bench(_Part):
     @property
     def sim_name(self) -> str | None:
         """NAME of `sim://NAME/motor`, or None where the motor is a real one."""
-        match = re.match(r"sim://([^/?]+)", self.motor.port)
-        return match[1] if match else None
+        return _sim_name(self.motor.port)
 
     @property
     def all_simulated(self) -> bool:
@@ -207,9 +206,10 @@ class Bench(_Part):
                 raise FieldError(("limits", what), message, "the limit must protect the load cell: lower it")
 
 
-def load_bench(name_or_path: str | Path = "simulated") -> Bench:
-    """A bench by file or shipped name; raises `InputError`."""
-    document = read_yaml(find_file("bench", name_or_path))
+def load_bench(name_or_path: str | Path | None = None) -> Bench:
+    """A bench by file or shipped name; raises `InputError`. None: `simulated`, as shipped."""
+    default = find_shipped("bench", DEFAULT_BENCH) if name_or_path is None else None
+    document = read_yaml(default or find_file("bench", name_or_path or DEFAULT_BENCH))
     bench = validate(document, Bench)
     bench = bench.model_copy(update={key: _with_map(bench, key, document) for key in ("motor", "load_cell")})
     bench._text, bench._source, bench._places = document.text, document.path, document.places
@@ -256,11 +256,38 @@ def load_model(name_or_path: str | Path) -> Model:
     return validate(read_yaml(find_file("pad", name_or_path)), Model)
 
 
+def _sim_name(port: str) -> str | None:
+    """NAME of `sim://NAME/KEY`, or None."""
+    match = re.match(r"sim://([^/?]+)", port)
+    return match[1] if match else None
+
+
+def ports_agree(bench: Bench) -> None:
+    """Raises `InputError` where one port is simulated and the other real or of another world, or has no name."""
+    ports = {"motor": bench.motor.port, "load_cell": bench.load_cell.port}
+    unreal = [key for key, port in ports.items() if port.startswith("sim://")]
+    if not unreal:
+        return
+    for key in ports:
+        if key not in unreal:
+            message = f"{key}.port is real, and the other one is simulated: they share neither pad nor time"
+            cure = "make both real, or both simulated (--simulated does)"
+            raise InputError(bench.place((key, "port")), message, cure)
+    for key, port in ports.items():
+        if _sim_name(port) is None:
+            message = f"{key}.port: `{port}` names no simulated bench"
+            raise InputError(bench.place((key, "port")), message, f"write sim://NAME/{key}")
+    if bench.sim_name != _sim_name(bench.load_cell.port):
+        message = f"load_cell.port is of another simulated bench than motor.port ({ports['motor']})"
+        raise InputError(bench.place(("load_cell", "port")), message, f"write sim://{bench.sim_name}/load_cell")
+
+
 def simulated(bench: Bench) -> Bench:
     """A dry run of `bench`: its drivers, rates and limits behind `sim://` ports, and a default truth if it has none."""
-    name = bench.sim_name or re.sub(r"[^A-Za-z0-9_-]", "-", bench.name)
+    own = re.sub(r"[^A-Za-z0-9_-]", "-", bench.name)
+    name = _sim_name(bench.motor.port) or _sim_name(bench.load_cell.port) or own
     ports = {
-        key: spec if spec.port.startswith("sim://") else spec.model_copy(update={"port": f"sim://{name}/{key}"})
+        key: spec if _sim_name(spec.port) == name else spec.model_copy(update={"port": f"sim://{name}/{key}"})
         for key, spec in (("motor", bench.motor), ("load_cell", bench.load_cell))
     }
     # model_copy keeps the private text and source: a simulation.pad stays relative to the bench file

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 from bench.config import Bench
 from bench.places import Key
 from bench.protocol import Approach, DepthStep, FlatStep, ForceStep, Protocol
-from bench.rates import force_latency_s, speed_step_mm_s, streams
+from bench.rates import force_latency_s, speed_step_mm_s, streams, too_far_behind, too_rare
 from bench.trajectory import Profile, braking_distance
 
 if TYPE_CHECKING:
@@ -169,6 +169,7 @@ class _Planner:
         self.at_mm = self.start_mm
 
     def plan(self) -> Plan:
+        self._check_rates()
         segments = tuple(self._segments())
         self._check_dynamics()
         self._tell_short_ramps()
@@ -227,6 +228,7 @@ class _Planner:
         segment = Segment(name, phase, "ramp", path, start, to, NAN, made, speed, self.acceleration, self.jerk)
         if not math.isnan(start) and not math.isnan(to) and start != to:
             reached = segment.profile().peak_speed_mm_s
+            self._check_following(name, (*path, "speed"), reached)
             if reached < made * (1 - 1e-9):
                 self.short.setdefault(speed, []).append((name, reached))
         return segment
@@ -313,6 +315,17 @@ class _Planner:
         if self.jerk is not None and not streams(self.bench):
             message = f"s_curve needs a motor that is streamed; `{self.bench.motor.driver}` makes its own trapezoids"
             self._once("profile", message, ("profile",), "use `profile: trapezoid` on this bench")
+
+    def _check_rates(self) -> None:
+        for device in ("motor", "load_cell"):
+            found = too_rare(self.bench, device, getattr(self.protocol.sampling, device))
+            if found:
+                self._once("sampling", found, ("sampling", device), "raise it here, or in the bench file")
+
+    def _check_following(self, name: str, path: tuple[Key, ...], speed_mm_s: float) -> None:
+        found = too_far_behind(self.bench, speed_mm_s, self.protocol.sampling.motor)
+        if found:
+            self._once(name, f"speed: {found}", path, "go slower, or raise the motor's baud rate and rate")
 
     def _owner(self, what: str) -> str:
         most, limit = getattr(self.bench.motor, f"max_{what}"), getattr(self.bench.limits, what)

@@ -54,8 +54,23 @@ class Prediction:
     """A force target had no model to say where it ends; the deepest way allowed was taken."""
 
 
+LONGEST_S = 7 * 86400.0
+"""A protocol of more than a week is a mistake; its prediction alone would fill a computer."""
+
+
+class TooLong(Exception):
+    """A segment (`index` of the plan's) with which the steps take more than `LONGEST_S`: `total_s` at the least."""
+
+    def __init__(self, index: int, total_s: float) -> None:
+        super().__init__(f"{total_s:g} s")
+        self.index, self.total_s = index, total_s
+
+
 def predict(plan: Plan, believed: Model | None) -> Prediction:
-    """Run the plan on the believed pad; without one, force targets go as deep as the limits allow."""
+    """Run the plan on the believed pad; without one, force targets go as deep as the limits allow.
+
+    Raises `TooLong`.
+    """
     return _Timeline(plan, believed).run()
 
 
@@ -95,14 +110,24 @@ class _Timeline:
         )
 
     def _add(self, index: int, segment: Segment) -> None:
+        if segment.kind not in ("ramp", "force_ramp"):
+            self._must_end(index, segment.duration_s)
         if segment.kind == "ramp":
-            self._ramp(segment.profile(self.at_mm))
+            profile = segment.profile(self.at_mm)
+            self._must_end(index, profile.duration_s)
+            self._ramp(profile)
         elif segment.kind == "force_ramp":
             self._force_ramp(index, segment)
         elif segment.kind == "force_hold" and self.plant is not None:
             self._force_hold(index, segment, self.plant)
         else:
             self._append(*_hold(segment.duration_s, self.at_mm))
+
+    def _must_end(self, index: int, duration_s: float) -> None:
+        """Before there is a grid for it."""
+        total_s = self.now_s + duration_s
+        if not total_s <= LONGEST_S:
+            raise TooLong(index, total_s)
 
     def _append(self, offsets: Array, positions: Array) -> None:
         """Add samples at times after now; the streaming pad follows if there is one."""
@@ -128,6 +153,7 @@ class _Timeline:
     def _force_ramp(self, index: int, segment: Segment) -> None:
         rising = self.believed is None or self.force_N < segment.target_N
         profile = segment.profile(self.at_mm, self.plan.deepest_mm if rising else self.plan.highest_mm)
+        self._must_end(index, profile.duration_s)
         if self.plant is None:
             self.bounded = True
             self._ramp(profile)

@@ -6,6 +6,7 @@ fault; a prediction takes the pad model (a force beyond the limit) and is an ans
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -17,7 +18,7 @@ from bench.config import Bench
 from bench.errors import InputError, PadbenchError, Refused
 from bench.places import Key
 from bench.plan import Plan, Problem, Segment, plan
-from bench.predict import Prediction, predict
+from bench.predict import LONGEST_S, Prediction, TooLong, predict
 from bench.protocol import Approach, Protocol
 from bench.rates import force_rate_Hz, motor_rate_Hz
 
@@ -107,12 +108,18 @@ def check(
     """Plan the protocol, simulate it on the believed pad, and say what stands against it.
 
     `surface_mm` (motor frame) is the surface once it is known: travel is then checked exactly, before only its span.
-    `latency_s` and `noise_N` as for `bench.plan.plan`.
+    `latency_s` and `noise_N` as for `bench.plan.plan`. Raises `InputError` where the steps take more than a week.
     """
     if protocol.in_air:
         believed = None  # there is nothing for it to be
     planned = plan(protocol, bench, believed, latency_s=latency_s, noise_N=noise_N)
-    prediction = predict(planned, believed)
+    try:
+        prediction = predict(planned, believed)
+    except TooLong as long:
+        segment = planned.segments[long.index]
+        what = f"{segment.name}: with this the steps take {long.total_s:.3g} s, more than a week ({LONGEST_S:g} s)"
+        cure = "times are in seconds, speeds in mm/s: shorten it, or make several protocols"
+        raise InputError(protocol.place(segment.path), what, cure) from None
     outcomes = _outcomes(prediction)
     problems = list(planned.problems)
     problems += _travel(planned, outcomes, surface_mm)
@@ -195,8 +202,20 @@ def _worst(outcomes: Iterable[Outcome], key: Callable[[Outcome], float]) -> list
 
 
 def _forces(planned: Plan, outcomes: tuple[Outcome, ...]) -> Iterator[Problem]:
-    """Steps that go beyond a limit; not those that only come back from there."""
+    """Steps that go beyond a limit; not those that only come back from there. What is no number is beyond each."""
     limits = planned.limits
+    finite = [math.isfinite(o.peak_N) and math.isfinite(o.least_N) for o in outcomes]
+    lost = [o for o, known in zip(outcomes, finite, strict=True) if not known]
+    for outcome in _worst(lost, lambda o: o.deepest_mm):
+        yield Problem(
+            outcome.segment.name,
+            f"the pad model gives no finite force at up to {outcome.deepest_mm:.3g} mm: nothing can be held to "
+            f"limits.force {limits.force_N:g} N",
+            kind="prediction",
+            cure="the model's elastic law is far too steep for this motion: see that it is the pad's",
+            path=outcome.segment.path,
+        )
+    outcomes = tuple(o for o, known in zip(outcomes, finite, strict=True) if known)
     pressed = (o for o in outcomes if o.peak_N > max(limits.force_N, o.start_N) + TOLERANCE)
     for outcome in _worst(pressed, lambda o: o.peak_N):
         segment = outcome.segment

@@ -58,7 +58,7 @@ class Precondition(_Part):
 
     to: Positive
     speed: Positive
-    cycles: Annotated[int, Field(ge=1)]
+    cycles: Annotated[int, Field(ge=1, le=MAX_STEPS)]
     rest: NotNegative = 0.0
 
 

@@ -15,6 +15,9 @@ from drivers.regmap import MotorMap, WriteBlock, load_map
 STREAM_HZ = 1000.0
 """What a streamed motor is asked for unless the bench file or the protocol says otherwise."""
 
+LEAST_FORCE_Hz = 8.0
+"""The tare takes a second, and eight readings."""
+
 _ORCA_BITS, _ORCA_BAUD = 28 * 11, 19200
 _LINES = {"dad141": (21 * 10, 115200, 600.0), "mt_sics": (18 * 10, 9600, 100.0)}
 """Load cells that send lines by themselves: bits of a line, baud rate and lines a second where the file gives none.
@@ -73,6 +76,32 @@ def force_latency_s(bench: Bench, asked_Hz: float | None = None) -> float:
     turns = 1.0 if streams(bench) else 2.0
     sample_s = 1.0 / force_rate_Hz(bench, asked_Hz) + reply_s
     return sample_s + max(0.0, bench.timing.force_delay) + turns / motor_rate_Hz(bench)
+
+
+def too_rare(bench: Bench, device: Literal["motor", "load_cell"], asked_Hz: float | None = None) -> str | None:
+    """What is wrong with a rate at which a run stops by itself (a motor that counts as silent, no tare); or None."""
+    if device == "load_cell":
+        rate_Hz = force_rate_Hz(bench, asked_Hz)
+        few = f"{rate_Hz:.3g} force samples a second make no tare: at least {LEAST_FORCE_Hz:g} are needed"
+        return few if rate_Hz < LEAST_FORCE_Hz else None
+    period_s, stale_s = 1.0 / motor_rate_Hz(bench, asked_Hz), bench.limits.stale
+    if period_s <= stale_s:
+        return None
+    rare = f"a motor sample every {1e3 * period_s:.3g} ms is too rare"
+    return f"{rare}: limits.stale stops a run after {1e3 * stale_s:.3g} ms without one"
+
+
+def too_far_behind(bench: Bench, speed_mm_s: float, asked_Hz: float | None = None) -> str | None:
+    """What is wrong with a speed: a motor streamed slower than it should be stands a period behind its command.
+
+    None where nothing is, or where the motor hears as often as it should: how well it follows then a run will tell.
+    """
+    rate_Hz, allowed_mm = motor_rate_Hz(bench, asked_Hz), bench.limits.following_error
+    behind_mm = speed_mm_s / rate_Hz
+    if not streams(bench) or rate_Hz >= STREAM_HZ or behind_mm <= allowed_mm or too_rare(bench, "motor", asked_Hz):
+        return None
+    told = f"at {speed_mm_s:.3g} mm/s a motor that is told a position every {1e3 / rate_Hz:.3g} ms"
+    return f"{told} is {behind_mm:.2g} mm behind: limits.following_error is {allowed_mm:g} mm"
 
 
 def _polled(bench: Bench, device: Literal["motor", "load_cell"]) -> tuple[float, float]:

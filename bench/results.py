@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -64,17 +64,19 @@ def analyse(
     *,
     prediction: Prediction | None = None,
     believed: Model | None = None,
+    structure: Mapping[str, Any] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Results:
     """Fit and diagnose the recording of a run folder; write model.yaml, fit.json, diagnosis.json and report.html.
 
+    `structure`: `law`, `order`, `contact`, `degree` of the fit, where they are not to be found out (as `identify.fit`).
     Diagnosed is `believed`, or else the fit; a run in air tells of the bench alone. What cannot be fitted (an air run,
     a run stopped before the pad) is said in the report, and so is what cannot be diagnosed. Raises `InputError` where
     the recording cannot be read.
     """
     tell = progress or (lambda _: None)
     recording = read_recording(folder)
-    fit, problem = _fit_of(recording)
+    fit, problem = _fit_of(recording, structure or {})
     if fit is not None:
         (folder / FIT).write_text(json.dumps(fit.to_json(), indent=2) + "\n", "utf-8")
         write_model(folder / MODEL, fit.model)
@@ -121,14 +123,14 @@ def is_air_run(recording: Recording) -> bool:
     return any(event.name == NO_SURFACE for event in recording.events)
 
 
-def _fit_of(recording: Recording) -> tuple[FitResult | None, str]:
+def _fit_of(recording: Recording, structure: Mapping[str, Any]) -> tuple[FitResult | None, str]:
     if is_air_run(recording):
         return None, "there was no pad (air run)"
     if recording.surface_mm is None:
         stopped = recording.result is None or recording.result.get("status") != "done"
         return None, "the run ended before the pad's surface was found" if stopped else "no surface was found"
     try:
-        return identify.fit(recording.measurement()), ""
+        return identify.fit(recording.measurement(), **structure), ""
     except InputError as error:
         return None, error.message
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import difflib
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from bench.errors import InputError
 
 Kind = Literal["protocol", "bench", "pad"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 _FOLDERS: dict[Kind, str] = {"protocol": "", "bench": "benches", "pad": "pads"}
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from bench.commands.options import add_bench, must_be_writable, say_plan
+from bench.commands.options import add_bench, say_plan
+from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE, InputError
 
 
@@ -13,8 +14,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("protocol", metavar="PROTOCOL", nargs="?", help="protocol file or shipped name")
     add_bench(parser)
-    parser.add_argument(
-        "--plot", type=Path, metavar="HTML", help="write planned trajectory and expected force as a page"
+    add_output(
+        parser,
+        "--plot",
+        kinds=("html",),
+        type=Path,
+        metavar="HTML",
+        help="write planned trajectory and expected force as a page",
     )
     parser.add_argument("--list", action="store_true", help="name the shipped protocols, benches and pads")
 
@@ -25,13 +31,13 @@ def main(args: argparse.Namespace) -> int:
         return _list()
     if args.protocol is None:
         raise InputError("PROTOCOL", "which one?", "give a file or a shipped name (`padbench check --list`)")
-    from bench.config import load_bench, load_model
+    from bench.config import load_bench, load_model, ports_agree
     from bench.preflight import check
     from bench.protocol import load_protocol
 
-    must_be_writable(args.plot)
     protocol = load_protocol(args.protocol)
     bench = load_bench(args.bench)
+    ports_agree(bench)
     preflight = check(protocol, bench, load_model(args.pad) if args.pad else None)
     if args.plot is not None:  # drawn where it is refused as well: it shows why
         from bench.planview import plan_view

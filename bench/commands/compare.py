@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from bench.commands.options import add_columns, add_structure, must_be_writable, pads, read_data, status
+from bench.commands.options import add_columns, add_structure, pads, read_data, status
+from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE, InputError
 
 
@@ -14,8 +15,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN", help="run folders, recordings or CSV")
     add_structure(parser)
     add_columns(parser)
-    parser.add_argument(
-        "--out", type=Path, default=Path("comparison.html"), metavar="HTML", help="default: %(default)s"
+    add_output(
+        parser,
+        "--out",
+        kinds=("html",),
+        type=Path,
+        default=Path("comparison.html"),
+        metavar="HTML",
+        help="default: %(default)s",
     )
 
 
@@ -28,7 +35,6 @@ def main(args: argparse.Namespace) -> int:
 
     if len(args.runs) < 2:
         raise InputError("RUN", "one run alone compares with nothing", "name two or more")
-    must_be_writable(args.out)
     measurements = pads(read_data(args, *args.runs))
     views = []
     for path, measurement in zip(args.runs, measurements, strict=True):

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from bench.commands.outputs import add_output
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("source", type=Path, metavar="IN", help="recording (MCAP), run folder or CSV")
-    parser.add_argument("target", type=Path, metavar="OUT", help="file to write: .csv or .mcap")
+    add_output(parser, "target", kinds=("csv", "mcap"), type=Path, metavar="OUT", help="file to write: .csv or .mcap")
     parser.add_argument("--columns", help="names in a CSV: time=…,position=…,force=…[,force_time=…]")
     parser.add_argument("--units", help="units in a CSV: time=ms,position=m,force=mN")
 

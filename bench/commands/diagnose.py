@@ -8,7 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.commands.options import add_columns, must_be_writable, read_data, status
+from bench.commands.options import add_columns, read_data, status
+from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE, InputError
 
 if TYPE_CHECKING:
@@ -21,10 +22,24 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("data", type=Path, metavar="DATA", help="MCAP, run folder or CSV")
     parser.add_argument("--model", required=True, metavar="MODEL", help="the model believed: file or shipped name")
     add_columns(parser)
-    parser.add_argument("--json", metavar="OUT", help="write diagnosis.json there; - for standard output alone")
-    parser.add_argument("--write", type=Path, metavar="MODEL2", help="write the extended model as YAML")
-    parser.add_argument("--next", type=Path, metavar="PROTOCOL2", help="write the protocol that tells rivals apart")
-    parser.add_argument("--report", type=Path, metavar="HTML", help="write a report page")
+    add_output(
+        parser,
+        "--json",
+        kinds=("json",),
+        stdout=True,
+        metavar="OUT",
+        help="write diagnosis.json there; - for standard output alone",
+    )
+    add_output(parser, "--write", kinds=("yaml",), type=Path, metavar="MODEL2", help="write the extended model as YAML")
+    add_output(
+        parser,
+        "--next",
+        kinds=("yaml",),
+        type=Path,
+        metavar="PROTOCOL2",
+        help="write the protocol that tells rivals apart",
+    )
+    add_output(parser, "--report", kinds=("html",), type=Path, metavar="HTML", help="write a report page")
 
 
 def main(args: argparse.Namespace) -> int:
@@ -34,8 +49,6 @@ def main(args: argparse.Namespace) -> int:
     from bench.diagnose.words import lines
     from bench.results import is_air_run
 
-    for path in (args.json, args.write, args.report, args.next):
-        must_be_writable(path)
     model = load_model(args.model)
     recording = read_data(args, args.data)[0]
     if is_air_run(recording) and model.pad.elastic.law != "none":

@@ -7,9 +7,9 @@ import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.commands.options import must_be_writable
+from bench.commands.outputs import add_output
 from bench.daily.words import add_arguments, agreed, bench_of, positive, put_out
-from bench.errors import EXIT_DONE, EXIT_NO, InputError
+from bench.errors import EXIT_DONE, EXIT_NO, InputError, PadbenchError
 
 if TYPE_CHECKING:
     from bench.config import Bench
@@ -22,7 +22,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--force-cap", type=float, default=2.0, metavar="N", help="never more than that (default: 2 N)")
     parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help="how long to listen (default: 5)")
     parser.add_argument("--yes", action="store_true", help="the direction is known to be right: ask nothing")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="write the bench file with the measured delay")
+    add_output(
+        parser,
+        "--write",
+        kinds=("yaml",),
+        edits="bench",
+        type=Path,
+        metavar="FILE",
+        help="write the bench file with the measured delay",
+    )
 
 
 def main(args: argparse.Namespace) -> int:
@@ -30,7 +38,6 @@ def main(args: argparse.Namespace) -> int:
     positive("--seconds", args.seconds, 600.0, "s", "some seconds do")
     bench = bench_of(args)
     positive("--force-cap", args.force_cap, bench.limits.force, "N", "limits.force of the bench file holds in any case")
-    must_be_writable(args.write)
     if args.write is not None and args.write.exists() and args.write.resolve() != (bench.source or Path()).resolve():
         raise InputError(str(args.write), "is there already, and another file than BENCH", "name a new one, or BENCH")
     if args.write is not None and args.write.exists():
@@ -38,14 +45,23 @@ def main(args: argparse.Namespace) -> int:
 
         own_file(bench.source, bench.name)
     from bench.daily import doctor
+    from bench.daily.checkup.finding import Checkup
     from bench.daily.open_bench import OpenBench
 
     with OpenBench(bench) as work:
         wishes = doctor.Wishes(
             args.seconds, args.force_cap, args.press, lambda question: agreed(question, yes=args.yes, must_say=True)
         )
-        checkup = doctor.examine(work, wishes)
+        checkup, failure = Checkup(), None
+        try:
+            doctor.examine(work, wishes, checkup)
+        except PadbenchError as error:
+            failure = error
     lines = [line for finding in checkup.findings for line in finding.lines()]
+    if failure is not None:  # what was found until then is worth as much as before
+        shown = {"bench": bench.name, **checkup.to_json(), "well": False, "stopped": str(failure), "written": None}
+        put_out(args, [*lines, "the check-up did not come to its end"], shown)
+        raise failure
     found = doctor.measured_delay(checkup)
     figures: dict[str, Any] = {"bench": bench.name, **checkup.to_json(), "written": None}
     if args.write is not None:

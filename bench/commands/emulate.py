@@ -10,7 +10,7 @@ from bench.errors import EXIT_DONE
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("bench", metavar="BENCH", nargs="?", default="simulated", help="bench file or shipped name")
+    parser.add_argument("bench", metavar="BENCH", nargs="?", help="bench file or shipped name (default: simulated)")
 
 
 def main(args: argparse.Namespace) -> int:

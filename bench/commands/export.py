@@ -6,6 +6,7 @@ import argparse
 import json
 from pathlib import Path
 
+from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE, InputError
 
 
@@ -14,7 +15,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", metavar="MODEL", help="model file, run folder or shipped pad's name")
     parser.add_argument("--to", required=True, choices=["c", "json"], help="C header for real-time loops, or JSON")
     parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="steps a second (default: 1000)")
-    parser.add_argument("--out", metavar="FILE", help="file to write; without it, standard output")
+    add_output(
+        parser,
+        "--out",
+        kinds=("c", "json"),
+        stdout=True,
+        metavar="FILE",
+        help="file to write; without it, standard output",
+    )
     parser.add_argument("--name", default="pad", help="prefix of what the C header defines (default: %(default)s)")
     parser.add_argument("--pad-only", action="store_true", help="leave out effects that an export cannot hold")
 

@@ -6,7 +6,8 @@ import argparse
 import json
 from pathlib import Path
 
-from bench.commands.options import add_columns, add_structure, must_be_writable, pads, read_data, status
+from bench.commands.options import add_columns, add_structure, pads, read_data, status
+from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE
 
 
@@ -24,9 +25,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ramps", choices=["recovered", "all"], help="fast: the rising ramps that show the elastic law"
     )
-    parser.add_argument("--json", metavar="OUT", help="write fit.json there; - for standard output, and nothing else")
-    parser.add_argument("--write", type=Path, metavar="MODEL", help="write the fitted model as YAML")
-    parser.add_argument("--report", type=Path, metavar="HTML", help="write a report page of the first DATA")
+    add_output(
+        parser,
+        "--json",
+        kinds=("json",),
+        stdout=True,
+        metavar="OUT",
+        help="write fit.json there; - for standard output, and nothing else",
+    )
+    add_output(parser, "--write", kinds=("yaml",), type=Path, metavar="MODEL", help="write the fitted model as YAML")
+    add_output(
+        parser, "--report", kinds=("html",), type=Path, metavar="HTML", help="write a report page of the first DATA"
+    )
 
 
 def main(args: argparse.Namespace) -> int:
@@ -34,8 +44,6 @@ def main(args: argparse.Namespace) -> int:
     from bench import identify
     from bench.results import fit_lines
 
-    for path in (args.json, args.write, args.report):
-        must_be_writable(path)
     recordings = read_data(args, *args.data)
     measurements = pads(recordings)
     options = {name: getattr(args, name) for name in ("starts", "ramps") if getattr(args, name) is not None}

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 def add_bench(parser: argparse.ArgumentParser) -> None:
     """`--bench` and `--pad`."""
-    parser.add_argument(
-        "--bench", default="simulated", metavar="BENCH", help="bench file or shipped name (default: %(default)s)"
-    )
+    parser.add_argument("--bench", metavar="BENCH", help="bench file or shipped name (default: simulated, as shipped)")
     parser.add_argument(
         "--pad", metavar="MODEL", help="the pad as the lab believes it to be: model file or shipped name"
     )
@@ -67,19 +65,6 @@ def pads(recordings: list[Recording]) -> list[Measurement]:
             cure = "fit a run with an approach; an air run tells of the bench alone"
             raise InputError(str(recording.source), "was recorded in air: there is no pad in it", cure)
     return [recording.measurement() for recording in recordings]
-
-
-def must_be_writable(path: str | Path | None) -> None:
-    """Raises `InputError` where a file cannot be written: said before the work whose result is to go there."""
-    if path is None or str(path) == "-":
-        return
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(str(path), "is a folder, not a file to write", "name a file in it")
-    if not path.parent.is_dir():
-        raise InputError(str(path), f"cannot be written: there is no folder {path.parent}", "make it, or name another")
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
-        raise InputError(str(path), "cannot be written: permission denied", "name a place that is yours")
 
 
 def say_plan(preflight: Preflight) -> None:

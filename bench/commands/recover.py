@@ -5,13 +5,22 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE, EXIT_LOST
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("source", type=Path, metavar="MCAP", help="the torn or damaged recording")
-    parser.add_argument("target", type=Path, metavar="OUT", nargs="?", help="default: NAME.recovered.mcap beside it")
+    add_output(
+        parser,
+        "target",
+        kinds=("mcap",),
+        type=Path,
+        metavar="OUT",
+        nargs="?",
+        help="default: NAME.recovered.mcap beside it",
+    )
 
 
 def main(args: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from bench.commands.options import add_bench, say, say_plan, status
 from bench.commands.progress import Progress
-from bench.errors import EXIT_DONE, EXIT_NO, InputError, Refused
+from bench.errors import EXIT_DONE, EXIT_NO, InputError, Refused, Stopped
 
 if TYPE_CHECKING:
     from bench.config import Bench
@@ -38,7 +38,7 @@ def main(args: argparse.Namespace) -> int:
     from bench.preflight import check
     from bench.protocol import load_protocol
     from bench.recording.unfinished import left_behind, must_be_idle, notice
-    from bench.run.folder import RUNS, discard, make_folder, must_be_free
+    from bench.run.folder import RUNS, must_be_free, own_folder
     from bench.run.runner import Notes, run_protocol
     from bench.shipped import find_file
 
@@ -60,12 +60,11 @@ def main(args: argparse.Namespace) -> int:
         )
     if not bench.all_simulated:
         must_be_idle(args.out.parent if args.out is not None else Path(RUNS), bench.name)
-    folder = make_folder(protocol.name, args.out, datetime.datetime.now())
-    left = left_behind(folder.parent, bench.name) if not bench.all_simulated else None
-    if left is not None:
-        say(notice(left))
-    started = time.perf_counter()
-    try:
+    with own_folder(protocol.name, args.out, datetime.datetime.now()) as folder:
+        left = left_behind(folder.parent, bench.name) if not bench.all_simulated else None
+        if left is not None:
+            say(notice(left))
+        started = time.perf_counter()
         with Progress(preflight.duration_s + preflight.approach_s) as progress:
             outcome = run_protocol(
                 protocol,
@@ -78,9 +77,6 @@ def main(args: argparse.Namespace) -> int:
                 planned_s=preflight.duration_s + preflight.approach_s,
                 left=left,
             )
-    except (InputError, Refused):
-        discard(folder)  # no device has been reached: nothing was measured, and the same command may be given again
-        raise
     _say_outcome(outcome, bench, time.perf_counter() - started)
     _after(outcome, preflight.prediction, believed)
     return EXIT_DONE if outcome.cause is None else EXIT_NO
@@ -89,8 +85,14 @@ def main(args: argparse.Namespace) -> int:
 def _after(outcome: Outcome, prediction: Prediction, believed: Model | None) -> None:
     from bench.results import analyse
 
-    with status("fitting the pad's model") as progress:
-        results = analyse(outcome.folder, prediction=prediction, believed=believed, progress=progress)
+    try:
+        with status("fitting the pad's model") as progress:
+            results = analyse(outcome.folder, prediction=prediction, believed=believed, progress=progress)
+    except KeyboardInterrupt:
+        raise Stopped(
+            "stopped by the operator (Ctrl-C) while the model was fitted\n"
+            f"  the recording is whole: `padbench report {outcome.folder}` fits it and writes the rest"
+        ) from None
     for line in results.lines():
         say(line)
     say(f"report: {results.report}")

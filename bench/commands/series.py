@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.commands.options import must_be_writable, say, status
+from bench.commands.options import say, status
+from bench.commands.outputs import add_output
 from bench.commands.progress import Progress
 from bench.daily.words import asked, put_out
 from bench.errors import EXIT_DONE, EXIT_NO, InputError, PadbenchError, Refused
@@ -24,7 +25,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--yes", action="store_true", help="ask nothing: measure all that is left")
     parser.add_argument("--redo", action="append", default=[], metavar="ID", help="measure this pad again")
     parser.add_argument("--changed", action="store_true", help="go on although bench or protocol have changed")
-    parser.add_argument("--json", metavar="OUT", help="write the table there; - for standard output alone")
+    add_output(
+        parser,
+        "--json",
+        kinds=("json",),
+        stdout=True,
+        metavar="OUT",
+        help="write the table there; - for standard output alone",
+    )
 
 
 def main(args: argparse.Namespace) -> int:
@@ -35,7 +43,6 @@ def main(args: argparse.Namespace) -> int:
     from bench.daily.series_state import read_state
     from bench.preflight import check
 
-    must_be_writable(args.json)
     series = load_series(args.list, dry_run=args.simulated)
     unknown = [pad_id for pad_id in args.redo if pad_id not in [pad.id for pad in series.pads]]
     if unknown:
@@ -50,7 +57,6 @@ def main(args: argparse.Namespace) -> int:
             f"bench '{series.bench.name}' is real hardware, and nobody is said to stand at it\n"
             "  stand there, a hand at its emergency stop, and add --attended (or dry-run it with --simulated)"
         )
-    state = read_state(series, changed=args.changed)
 
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True) if quiet else say(text)
@@ -60,7 +66,7 @@ def main(args: argparse.Namespace) -> int:
 
         try:
             with status(f"fitting {folder.name}", quiet=quiet) as progress:
-                results = analyse(folder, believed=series.believed, progress=progress)
+                results = analyse(folder, believed=series.believed, structure=series.structure, progress=progress)
         except PadbenchError as error:
             tell(f"{folder.name}: no fit: {error}")
             return
@@ -75,11 +81,12 @@ def main(args: argparse.Namespace) -> int:
         progress=lambda: Progress(preflight.duration_s + preflight.approach_s),
         by_itself=args.yes,
     )
-    try:
-        whole = work.measure(series, preflight, state, person, tuple(args.redo))
-    finally:
-        found = series_table.rows(series, state)
-        if series.out.is_dir():
+    with work.held(series.out):
+        state = read_state(series, changed=args.changed)
+        try:
+            whole = work.measure(series, preflight, state, person, tuple(args.redo))
+        finally:
+            found = series_table.rows(series, state)
             series_table.write(series, found)
     left = [row["id"] for row in found if row["status"] not in ("done", "skipped")]
     lines = [*series_table.lines(found), f"table: {series.out / series_table.TABLE}"]

@@ -6,10 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.commands.options import add_columns, must_be_writable, read_data
+from bench.commands.options import add_columns, read_data
+from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE, InputError
 
 if TYPE_CHECKING:
+    from bench.recording.types import Array
     from sim.model import Model
 
 
@@ -21,16 +23,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     motion.add_argument(
         "--like", type=Path, metavar="DATA", help="the measured motion of a recording, run folder or CSV"
     )
-    parser.add_argument("--bench", default="simulated", metavar="BENCH", help="with --protocol (default: %(default)s)")
+    parser.add_argument("--bench", metavar="BENCH", help="with --protocol (default: simulated, as shipped)")
     add_columns(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="CSV", help="file to write")
+    add_output(parser, "--out", kinds=("csv",), type=Path, required=True, metavar="CSV", help="file to write")
 
 
 def main(args: argparse.Namespace) -> int:
     """Simulate and write CSV; with --like, also say how far the simulation is from the data."""
     from bench.config import load_model
 
-    must_be_writable(args.out)
     model = load_model(args.model)
     return _over_protocol(args, model) if args.protocol else _over_data(args, model)
 
@@ -44,14 +45,27 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
     protocol = load_protocol(args.protocol)
     if protocol.in_air:
         raise InputError(args.protocol, "presses no pad (`approach: none`)", "name a protocol with an approach")
-    preflight = check(protocol, load_bench(args.bench), model)
+    bench = load_bench(args.bench)
+    preflight = check(protocol, bench, model)
     for problem in preflight.errors:
-        print(f"note: on bench '{args.bench}' this would be refused: {problem}")
+        print(f"note: on bench '{bench.name}' this would be refused: {problem}")
     prediction = preflight.prediction
+    _must_be_finite(args.model, prediction.force_N)
     time_s = prediction.time_s
     write_csv(args.out, time_s, prediction.position_mm, time_s, prediction.force_N)
     print(f"wrote {args.out}: {time_s.size} samples over {time_s[-1]:.1f} s")
     return EXIT_DONE
+
+
+def _must_be_finite(model: str, force_N: Array) -> None:
+    import numpy as np
+
+    lost = np.count_nonzero(~np.isfinite(force_N))
+    if lost:
+        what = f"gives no finite force over this motion ({lost} of {force_N.size} samples)"
+        raise InputError(
+            model, what, "its elastic law is far too steep for it: see that model and motion belong together"
+        )
 
 
 def _over_data(args: argparse.Namespace, model: Model) -> int:
@@ -64,6 +78,7 @@ def _over_data(args: argparse.Namespace, model: Model) -> int:
     t, x, force_t = measured.position_time_s, measured.position_mm, measured.force_time_s
     like = likeness(model, measured)
     force = like.force_N
+    _must_be_finite(args.model, force)
     if force_t.size == t.size and not np.array_equal(force_t, t):
         # Two clocks with a force for every position: row by row as the data have it.
         write_csv(args.out, t, x, t, force, extra={"force_time_s": (t, force_t)})

@@ -32,7 +32,7 @@ def main(args: argparse.Namespace) -> int:
         if args.back_off is None:
             found = zero.read_zero(work, args.seconds)
         else:
-            found = zero.read_zero_backing_off(work, args.back_off)
+            found = zero.read_zero_backing_off(work, args.back_off, args.seconds)
     put_out(args, _lines(found), found)
     return EXIT_DONE
 

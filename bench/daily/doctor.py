@@ -61,14 +61,16 @@ class Wishes:
     confirm: Callable[[str], bool]
 
 
-def examine(work: OpenBench, wishes: Wishes) -> Checkup:
-    """The whole check-up. Raises `Stopped` where a limit was met, `Refused` where it cannot go on."""
-    checkup = Checkup()
+def examine(work: OpenBench, wishes: Wishes, checkup: Checkup) -> None:
+    """The whole check-up, put into `checkup` as it comes.
+
+    Raises `Stopped` where a limit was met, `Refused` where it cannot go on; what was found until then stays found.
+    """
     free = work.bench.all_simulated
     moved_mm = work.move(lambda: _nudge(work), force_cap_N=wishes.cap_N, pull_too=True, may_home=free)
     _identities(work, checkup)
     if not _direction(wishes, checkup, moved_mm):
-        return checkup
+        return
     work.notebook.clear()
     air = work.move(lambda: _in_air(work, wishes.seconds), force_cap_N=wishes.cap_N, pull_too=True, may_home=free)
     _judge_air(work, wishes, checkup, air)
@@ -77,7 +79,6 @@ def examine(work: OpenBench, wishes: Wishes) -> Checkup:
     figures, findings = latency_timers(work.bench)
     checkup.add("adapters", figures, findings)
     _lines(work, checkup)
-    return checkup
 
 
 # -- who is there, which way is forth ----------------------------------------------------------------------------------

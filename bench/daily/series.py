@@ -7,9 +7,10 @@ half of a protocol is no measurement.
 from __future__ import annotations
 
 import datetime
+import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -20,8 +21,9 @@ from bench.daily.series_state import PadState, State, Turn
 from bench.errors import InputError, Refused
 from bench.preflight import Preflight
 from bench.protocol import Protocol
+from bench.recording.lock import hold
 from bench.recording.unfinished import left_behind, must_be_idle, notice
-from bench.run.folder import discard
+from bench.run.folder import REPORT, discard
 from bench.run.runner import Notes, Outcome, run_protocol
 
 MOST_STOPPED = 2
@@ -55,6 +57,29 @@ class Person:
     now: Callable[[], datetime.datetime] = _now
 
 
+@contextmanager
+def held(out: Path) -> Iterator[None]:
+    """A series' folder, made where there is none, for one process alone: two would erase each other's turns.
+
+    Raises `Refused` where another series measures into it, `InputError` where it cannot be made.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(str(out), f"cannot be made: {error.strerror}", "name another `out` in the list") from None
+    try:
+        descriptor = os.open(out, os.O_RDONLY)
+    except OSError:  # a system that opens no folder
+        yield
+        return
+    try:
+        if not hold(descriptor):
+            raise Refused(f"{out}: another series is being measured into it\n  wait for its end, or leave it there")
+        yield
+    finally:
+        os.close(descriptor)
+
+
 def measure(series: Series, preflight: Preflight, state: State, person: Person, redo: tuple[str, ...] = ()) -> bool:
     """Measure what is left of the series; the state is on disk after every turn. False where somebody left."""
     for pad_id in redo:
@@ -65,10 +90,19 @@ def measure(series: Series, preflight: Preflight, state: State, person: Person, 
         kept = state.of(pad.id)
         if kept.status in ("done", "skipped"):
             person.say(f"[{number} of {len(series.pads)}] {pad.id}: {kept.status}")
+            _make_up(series, person, kept)
             continue
         if not _one(series, preflight, state, person, number, pad, kept):
             return False
     return True
+
+
+def _make_up(series: Series, person: Person, kept: PadState) -> None:
+    """Analyse a run whose analysis never came to its end: whoever ended it then would never have its figures."""
+    last = next((turn for turn in reversed(kept.turns) if turn.status == "done"), None)
+    if kept.status == "done" and last is not None and not (series.out / last.folder / REPORT).exists():
+        person.say(f"{last.folder} was measured and not analysed: that is done now")
+        person.analyse(series.out / last.folder)
 
 
 def _one(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -41,6 +41,10 @@ class SeriesFile(_Part):
     rest_s: NotNegative = Field(0.0, description="s, from mounting a pad (or its last contact) to its run")
     operator: Word | None = None
     conditions: Word | None = None
+    law: Literal["auto", "exponential", "power", "polynomial", "spline"] = Field("auto", description="as `fit --law`")
+    order: Annotated[Word, Field(pattern=r"^(auto|[1-9]\d?)$")] = Field("auto", description="as `fit --order`")
+    contact: Literal["auto", "bonded", "unilateral"] = Field("auto", description="as `fit --contact`")
+    degree: Annotated[int, Field(ge=1)] | None = Field(None, description="of a polynomial law, as `fit --degree`")
     samples: Annotated[list[Pad], Field(min_length=1)]
 
     @model_validator(mode="after")
@@ -69,6 +73,8 @@ class Series:
     operator: str | None
     conditions: str | None
     pads: list[Pad]
+    structure: dict[str, Any]
+    """What is fitted to every pad: `law`, `order`, `contact`, `degree`, as `identify.fit` takes them."""
 
 
 def folder_name(pad_id: str) -> str:
@@ -93,6 +99,7 @@ def load_series(path: Path, *, dry_run: bool = False) -> Series:
         operator=listed.operator,
         conditions=listed.conditions,
         pads=listed.samples,
+        structure={name: getattr(listed, name) for name in ("law", "order", "contact", "degree")},
     )
 
 

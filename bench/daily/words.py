@@ -10,7 +10,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bench.commands.options import must_be_writable, say
+from bench.commands.options import say
+from bench.commands.outputs import add_output
 from bench.errors import InputError, Refused
 
 if TYPE_CHECKING:
@@ -27,14 +28,20 @@ def add_arguments(parser: argparse.ArgumentParser, *, moves: bool, figures: bool
     if moves:
         parser.add_argument("--attended", action="store_true", help="somebody stands at the bench, a hand at its stop")
     if figures:
-        parser.add_argument("--json", metavar="OUT", help="write every figure there; - for standard output alone")
+        add_output(
+            parser,
+            "--json",
+            kinds=("json",),
+            stdout=True,
+            metavar="OUT",
+            help="write every figure there; - for standard output alone",
+        )
 
 
 def bench_of(args: argparse.Namespace) -> Bench:
     """The bench that the arguments name; raises `InputError`, and `Refused` for a real one that nobody attends."""
     from bench.config import load_bench, simulated
 
-    must_be_writable(getattr(args, "json", None))
     bench = load_bench(args.bench)
     if args.simulated:
         bench = simulated(bench)

@@ -56,11 +56,11 @@ def _read(work: OpenBench, seconds: float) -> Script[tuple[np.ndarray, np.ndarra
     return channel.gross_N, channel.time_s, {"overloaded": int(channel.flagged.sum())}
 
 
-def read_zero_backing_off(work: OpenBench, by_mm: float) -> dict[str, Any]:
+def read_zero_backing_off(work: OpenBench, by_mm: float, seconds: float) -> dict[str, Any]:
     """As a run does it: back off, see whether the force falls, then average. Raises `Stopped` where it touched."""
 
     def whole() -> Script[None]:
-        yield from tare(work.loop, work.mover, Approach(retract=by_mm), 1.0)
+        yield from tare(work.loop, work.mover, Approach(retract=by_mm), 1.0, seconds)
 
     work.move(whole, may_home=work.bench.all_simulated)
     found = work.notebook.data_of("tare")
@@ -72,6 +72,7 @@ def read_zero_backing_off(work: OpenBench, by_mm: float) -> dict[str, Any]:
         "drift_N_s": found["drift_N_s"],
         "std_of_mean_N": found["sigma_N"] / float(np.sqrt(found["samples"])),
         "samples": found["samples"],
+        "seconds": seconds,
         "contact_check": found["contact_check"],
         "backed_off_mm": found["backed_off_mm"],
     }

@@ -14,6 +14,95 @@ from sim.model import Model
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}", re.ASCII)
 
+_KEYWORDS = frozenset(
+    [
+        "alignas",
+        "alignof",
+        "and",
+        "asm",
+        "auto",
+        "bitand",
+        "bitor",
+        "bool",
+        "break",
+        "case",
+        "catch",
+        "char",
+        "class",
+        "compl",
+        "concept",
+        "const",
+        "consteval",
+        "constexpr",
+        "constinit",
+        "continue",
+        "decltype",
+        "default",
+        "delete",
+        "do",
+        "double",
+        "dynamic_cast",
+        "else",
+        "enum",
+        "explicit",
+        "export",
+        "extern",
+        "false",
+        "float",
+        "for",
+        "friend",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "mutable",
+        "namespace",
+        "new",
+        "noexcept",
+        "not",
+        "nullptr",
+        "operator",
+        "or",
+        "private",
+        "protected",
+        "public",
+        "register",
+        "reinterpret_cast",
+        "requires",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "static_assert",
+        "static_cast",
+        "struct",
+        "switch",
+        "template",
+        "this",
+        "thread_local",
+        "throw",
+        "true",
+        "try",
+        "typedef",
+        "typeid",
+        "typename",
+        "typeof",
+        "union",
+        "unsigned",
+        "using",
+        "virtual",
+        "void",
+        "volatile",
+        "wchar_t",
+        "while",
+        "xor",
+    ]
+)
+"""Of C23 and C++20; what begins with an underscore is no name here anyway."""
+
 
 def c_header(
     model: Model,
@@ -31,6 +120,8 @@ def c_header(
     T = 1.0 / checked_rate(rate_hz)
     if not _NAME.fullmatch(name):
         raise InputError("--name", f"`{name}` is no C identifier", "letters, digits and _, a letter first")
+    if name in _KEYWORDS:
+        raise InputError("--name", f"`{name}` is a word of the language C or C++", "give a name of your own")
     pad = real_time_pad(model, pad_only=pad_only)
     modes = pad.relaxation.order
     c_0 = _filled(number(pad.relaxation.c_0), name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,10 @@ MAX_SIZE = 256 << 20
 """Bytes of a CSV file; as cells they take some ten times as much memory. Three channels at 1 kHz for two hours."""
 
 _SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab"}
+
+
+_OTHER_KINDS = {".yaml": "YAML", ".yml": "YAML", ".json": "JSON", ".html": "HTML", ".htm": "HTML"}
+_YAML_KEY = re.compile(r"[A-Za-z_][\w-]*:(\s[^,;\t]*)?$")
 
 
 @dataclass
@@ -48,6 +53,7 @@ def read_table(path: Path) -> Table:
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), None)
     if first is None:
         raise InputError(str(path), "is empty", _WANTED)
+    _must_be_rows(path, first)
     separator = max(_SEPARATORS, key=first.count)
     if first.count(separator) == 0:
         separator = ","
@@ -111,6 +117,20 @@ def _decode(path: Path, notes: list[str]) -> str:
         raise InputError(str(path), "is neither a recording nor text", _WANTED) from None
     notes.append("read as Windows text (cp1252), since it is not UTF-8")
     return text
+
+
+def _must_be_rows(path: Path, first: str) -> None:
+    """Other kinds of text, told by the ending or by their first line: what they lack of a table is not the fault."""
+    kind = _OTHER_KINDS.get(path.suffix.lower())
+    if kind is None and first.lstrip().startswith(("{", "[")):
+        kind = "JSON"
+    if kind is None and first.lstrip().startswith("<"):
+        kind = "HTML or XML"
+    if kind is None and (first.startswith(("---", "%YAML")) or _YAML_KEY.match(first)):
+        kind = "YAML"
+    if kind is not None:
+        what = "; a model, bench or protocol file?" if kind == "YAML" else ""
+        raise InputError(str(path), f"is {kind}, and no measured data{what}", _WANTED)
 
 
 def _check_header(header: Sequence[str], path: Path, line: int) -> None:

@@ -264,6 +264,7 @@ def _open_store(path: Path, mode: Mode, epoch_ns: int, flush_ns: int) -> Store:
     try:
         return InlineStore(path, epoch_ns, flush_ns)
     except OSError as error:
+        path.unlink(missing_ok=True)  # claimed here, and empty
         raise InputError(
             str(path), f"cannot be written ({error.strerror})", "make room, or name another folder"
         ) from None

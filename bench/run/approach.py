@@ -56,11 +56,11 @@ def slow_mm_s(approach: Approach, axis: Axis) -> float:
     return max(approach.speed / SLOWER, axis.slowest_mm_s)
 
 
-def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float) -> Script[Air]:
+def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float, seconds: float = TARE_S) -> Script[Air]:
     """Average the force in free air and make it the zero; refuse where the probe already touches something.
 
     With a pad, the axis first backs off by `approach.retract` (as far as travel allows): if the force falls by more
-    than the touch threshold, there was contact. Raises `Stopped` with what was found.
+    than the touch threshold, there was contact. It is averaged over `seconds`. Raises `Stopped` with what was found.
     """
     before = yield from _average(loop, CHECK_S)
     backed_mm = 0.0
@@ -72,11 +72,11 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float) 
         yield from mover.go(target, slow_mm_s)
         yield from loop.sleep(CHECK_S)
     window = mover.watch()
-    yield from loop.sleep(TARE_S)
+    yield from loop.sleep(seconds)
     mover.unwatch()
     if len(window.gross_N) < 8:
         raise Stopped(
-            f"only {len(window.gross_N)} force samples came in {TARE_S:g} s of tare; at least 8 are needed: "
+            f"only {len(window.gross_N)} force samples came in {seconds:g} s of tare; at least 8 are needed: "
             "raise the load cell's rate"
         )
     air = air_of(np.array(window.force_time_s), np.array(window.gross_N))
@@ -88,7 +88,7 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float) 
             f"{backed_mm:.2f} mm (threshold {touch:.3f} N); retract the probe (or lower the pad) and start again"
         )
     asked_N = approach.force if approach is not None else 0.0
-    if abs(air.drift_N_s) * TARE_S > max(asked_N, min(5.0 * air.sigma_N, unsteady_N(np.array(window.gross_N)))):
+    if abs(air.drift_N_s) * seconds > max(asked_N, min(5.0 * air.sigma_N, unsteady_N(np.array(window.gross_N)))):
         raise Stopped(
             f"the force is not steady in air ({air.drift_N_s:+.3f} N/s): the probe touches something, "
             "or the load cell is still warming up; no zero can be taken"

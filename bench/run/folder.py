@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import datetime
+import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from bench.errors import InputError
+from bench.errors import InputError, Refused
+from bench.recording.lock import hold
 
 RECORDING = "recording.mcap"
 MODEL = "model.yaml"
@@ -28,36 +32,80 @@ def must_be_free(out: Path) -> None:
 
 
 def discard(folder: Path) -> None:
-    """Take away the folder of a run that never began, with its recording of nothing."""
+    """Take away the folder of a run that never began, if nothing is in it; for whoever made it."""
     with contextlib.suppress(OSError):
-        (folder / RECORDING).unlink(missing_ok=True)
         folder.rmdir()
         if folder.parent.name == RUNS:
             folder.parent.rmdir()  # only if this was to be its first run: others keep it
 
 
-def make_folder(protocol_name: str, out: Path | None, now: datetime.datetime) -> Path:
-    """Make `out`, or `runs/<local date>_<time>_<protocol>[_n]/` in the working directory.
+@contextmanager
+def own_folder(protocol_name: str, out: Path | None, now: datetime.datetime) -> Iterator[Path]:
+    """`out`, or `runs/<local date>_<time>_<protocol>[_n]/` in the working directory, this run's alone until the end.
 
-    Raises `InputError` where `out` is not empty, or cannot be made.
+    Who comes second to one folder is refused and leaves it as it is, however close behind. A run that is refused
+    inside leaves no folder where there was none.
+    Raises `InputError` where `out` is not empty or another run has it, or where it cannot be made.
     """
-    if out is not None:
-        must_be_free(out)
-        folder = out
-    else:
-        stem = f"{now:%Y-%m-%d_%H%M%S}_{re.sub(r'[^A-Za-z0-9._-]+', '-', protocol_name)}"
-        folder = Path(RUNS) / stem
-        n = 2
-        while folder.exists():
-            folder = Path(RUNS) / f"{stem}_{n}"
-            n += 1
+    folder, made = _made(protocol_name, out, now)
+    descriptor = _opened(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".writable"
+        if descriptor is not None and not hold(descriptor):
+            raise InputError(str(folder), "another run has it", "give --out a new folder: no run overwrites another")
+        must_be_free(folder)  # by now another may have begun and ended there
+        try:
+            _try_writing(folder)
+            yield folder
+        except (InputError, Refused):
+            if made:
+                discard(folder)
+            raise
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+def _made(protocol_name: str, out: Path | None, now: datetime.datetime) -> tuple[Path, bool]:
+    """The folder, and whether it was made here: one that was there already (and is empty) is somebody else's."""
+    try:
+        if out is not None:
+            must_be_free(out)
+            out.parent.mkdir(parents=True, exist_ok=True)
+            return out, _made_now(out)
+        stem = f"{now:%Y-%m-%d_%H%M%S}_{re.sub(r'[^A-Za-z0-9._-]+', '-', protocol_name)}"
+        folder, n = Path(RUNS) / stem, 2
+        folder.parent.mkdir(exist_ok=True)
+        while not _made_now(folder):
+            folder, n = Path(RUNS) / f"{stem}_{n}", n + 1
+    except OSError as error:
+        raise _unwritable(folder if out is None else out, error) from error
+    return folder, True
+
+
+def _made_now(folder: Path) -> bool:
+    try:
+        folder.mkdir()
+    except FileExistsError:
+        return False
+    return True
+
+
+def _opened(folder: Path) -> int | None:
+    """The folder open, to be held; None where a system opens none."""
+    try:
+        return os.open(folder, os.O_RDONLY)
+    except OSError:
+        return None
+
+
+def _try_writing(folder: Path) -> None:
+    probe = folder / ".writable"
+    try:
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise InputError(
-            str(folder), f"cannot be written: {error.strerror}", "choose another place with --out"
-        ) from error
-    return folder
+        raise _unwritable(folder, error) from error
+
+
+def _unwritable(folder: Path, error: OSError) -> InputError:
+    return InputError(str(folder), f"cannot be written: {error.strerror}", "choose another place with --out")

@@ -59,12 +59,12 @@ class Foresight:
         now_N = self._plant.force_N
         most, least = self.extremes(curve)
         limits = self.limits
-        if most > max(limits.force_N, now_N):
+        if not most <= max(limits.force_N, now_N):  # nor where it is no number
             raise Stopped(
                 f"{name}: not begun: the believed pad would answer with {most:.3g} N on the way to "
                 f"{curve.end_mm:.3g} mm, {limits.force_N:g} N allowed"
             )
-        if least < min(-limits.tension_N, now_N):
+        if not least >= min(-limits.tension_N, now_N):
             raise Stopped(
                 f"{name}: not begun: the believed pad would pull with {-least:.3g} N on the way to "
                 f"{curve.end_mm:.3g} mm, {limits.tension_N:g} N allowed"

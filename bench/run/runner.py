@@ -17,14 +17,14 @@ from typing import Literal
 import yaml
 
 from bench.config import Bench
-from bench.errors import InputError, Stopped
+from bench.errors import InputError, Refused, Stopped
 from bench.plan import Plan
 from bench.protocol import Protocol
 from bench.rates import force_rate_Hz, motor_rate_Hz
 from bench.recording.unfinished import Left
 from bench.recording.writer import Recorder
 from bench.run.axis import Axis
-from bench.run.folder import RECORDING
+from bench.run.folder import MODEL, RECORDING
 from bench.run.foresight import Foresight
 from bench.run.loop import Loop
 from bench.run.rig import Rig, is_simulated, open_rig
@@ -33,6 +33,7 @@ from bench.run.script import Findings, Run
 from bench.run.signals import SIGNALS as SIGNALS
 from bench.run.signals import Operator, listening
 from bench.run.touchoff import warm_up
+from bench.yamlfile import parse, validate
 from drivers.errors import DriverError
 
 HOST_PACKAGES = ("padbench", "numpy", "scipy", "numba", "pymodbus", "pyserial", "mcap")
@@ -103,7 +104,8 @@ def run_protocol(
         force_Hz = force_rate_Hz(bench, protocol.sampling.load_cell)
         motor_Hz = motor_rate_Hz(bench, protocol.sampling.motor)
         path, per_s = folder / RECORDING, force_Hz + motor_Hz
-        with Recorder(path, rig.clock, mode=mode, planned_s=planned_s, samples_per_s=per_s) as recorder:
+        made = Recorder(path, rig.clock, mode=mode, planned_s=planned_s, samples_per_s=per_s)
+        with _kept_once_begun(made) as recorder:
             recorder.begin(
                 _run_record(protocol, bench, notes or Notes()),
                 _host_record(),
@@ -176,6 +178,17 @@ def _run(
     return Outcome(folder, cause or problem, run.found, seconds, loop.motor_count, loop.force_count)
 
 
+@contextmanager
+def _kept_once_begun(recorder: Recorder) -> Iterator[Recorder]:
+    """Takes the recording of a run away again where no device was reached: nothing was measured."""
+    try:
+        with recorder:
+            yield recorder
+    except (InputError, Refused):
+        recorder.path.unlink(missing_ok=True)
+        raise
+
+
 def _wind_down(loop: Loop, run: Run, cause: str) -> None:
     """Stop and make safe; a second failure is recorded beside the first, and never replaces it."""
     loop.monitor.stopping = True  # before the loop's first turn, which would raise the first cause again
@@ -211,7 +224,8 @@ def _foresight(believed_text: str | None, plan: Plan) -> Foresight | None:
         return None
     from sim.model import Model
 
-    return Foresight(Model.from_dict(yaml.safe_load(believed_text)), plan.limits)
+    believed = validate(parse(believed_text, Path(MODEL)), Model)  # as every other command reads it
+    return Foresight(believed, plan.limits)
 
 
 def _as_sampled(bench: Bench, protocol: Protocol) -> Bench:

@@ -6,7 +6,7 @@ import contextlib
 import os
 from typing import TYPE_CHECKING, Any, Literal
 
-from bench.config import Bench, load_model
+from bench.config import Bench, load_model, ports_agree
 from bench.errors import InputError
 from drivers.regmap import load_map
 from drivers.spec import LoadCellSpec, MotorSpec
@@ -24,11 +24,7 @@ def world_of(bench: Bench, clock: Literal["virtual", "wall"] | None = None) -> W
     `clock` ("wall", "virtual") overrides the file's. Raises `InputError` where the file describes what cannot be
     simulated.
     """
-    for key, other in (("motor", bench.load_cell.port), ("load_cell", bench.motor.port)):
-        if not getattr(bench, key).port.startswith("sim://") and other.startswith("sim://"):
-            message = f"{key}.port is real, and the other one is simulated: they share neither pad nor time"
-            cure = "make both real, or both simulated (--simulated does)"
-            raise InputError(bench.place((key, "port")), message, cure)
+    ports_agree(bench)
     truth = bench.simulation
     if truth is None or bench.pad_file is None or bench.sim_name is None:
         raise InputError(bench.place(("motor", "port")), "is simulated, but there is no `simulation` block", "add one")

@@ -198,7 +198,7 @@ def test_a_recording_that_is_none(padbench, content, message):
         (("report", "nothing"), (r"nothing: does not exist",)),
         (("report", "data.csv"), (r"data\.csv: is not a run folder", r"padbench fit FILE --report")),
         (("convert", "data.csv", "x.foo"), (r"x\.foo: ends neither in \.csv nor in \.mcap",)),
-        (("convert", "data.csv", "data.csv"), (r"is the input itself",)),
+        (("convert", "data.csv", "data.csv"), (r"is an input of this command",)),
         (("recover", "nothing.mcap"), (r"nothing\.mcap: does not exist",)),
         (("simulate", "polyurethane", "--like", "nothing.csv", "--out", "x.csv"), (r"nothing\.csv: does not exist",)),
         (("simulate", "polyurethane", "--protocol", "air", "--out", "x.csv"), (r"air: presses no pad",)),

@@ -17,7 +17,7 @@ import yaml
 
 from bench import cli
 from bench.recording import read_recording
-from bench.run.folder import make_folder
+from bench.run.folder import own_folder
 from tests.bench.run.benches import SHORT, bench_file, merged, protocol_file
 from tests.bench.said import AIR, FIT, Said
 
@@ -147,9 +147,13 @@ def test_a_terminal_that_is_closed_meanwhile_costs_nothing(padbench, tmp_path, m
 
 def test_folders_of_one_second_are_numbered(padbench):
     now = datetime.datetime(2026, 11, 21, 10, 15)
-    names = [make_folder("quick", None, now).name for _ in range(3)]
+    names = []
+    for _ in range(3):
+        with own_folder("quick", None, now) as folder:
+            names.append(folder.name)
     assert names == [f"2026-11-21_101500_quick{tail}" for tail in ("", "_2", "_3")]
-    assert make_folder("quick", Path("a/b"), now) == Path("a/b") and Path("a/b").is_dir()
+    with own_folder("quick", Path("a/b"), now) as folder:
+        assert folder == Path("a/b") and folder.is_dir()
 
 
 def test_a_stopped_run_keeps_data_and_says_why(padbench, tmp_path):
@@ -360,3 +364,25 @@ def test_schema_is_json(padbench, kind):
     said = padbench("schema", kind)
     assert said.status == 0
     assert json.loads(said.out)["type"] == "object"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("words", [["check", "quick"], ["check", "--list"], ["schema", "protocol"]])
+def test_a_full_disk_behind_standard_output_is_no_defect(tmp_path, words):
+    """Little is written when the interpreter ends, much before: both are said, once."""
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "bench.cli", *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert done.returncode == 2 and "cannot be written: No space left on device" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_ctrl_c_while_the_model_is_fitted_says_where_the_recording_is(padbench, tmp_path, monkeypatch):
+    def struck(*given, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bench.results.analyse", struck)
+    said = padbench("run", protocol_file(tmp_path, AIR), "--out", "out")
+    assert said.status == 1 and "Ctrl-C" in said.err and "`padbench report out`" in said.err
+    assert Path("out/recording.mcap").is_file()

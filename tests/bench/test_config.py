@@ -10,6 +10,7 @@ from bench.config import load_bench, load_model, simulated
 from bench.errors import InputError
 from bench.schemas import schema
 from bench.shipped import find_shipped, shipped_names
+from tests.bench.run.benches import bench_file as changed_bench
 
 REAL = """\
 name: lab 2
@@ -178,3 +179,27 @@ def test_schemas_are_draft_07(kind: str) -> None:
     assert "prefixItems" not in text and "inf" not in text.replace("infinite", "")
     required = {"protocol": ["name", "steps"], "bench": ["name", "motor", "load_cell", "limits"], "model": ["pad"]}
     assert content["required"] == required[kind]
+
+
+# -- ports that belong together ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("motor", "load_cell", "line", "words"),
+    [
+        ("/dev/null", "sim://bench/load_cell", "motor", "is real, and the other one is simulated"),
+        ("sim://bench/motor", "/dev/null", "load_cell", "is real, and the other one is simulated"),
+        ("sim://", "sim://bench/load_cell", "motor", "names no simulated bench"),
+        ("sim://bench/motor", "sim://", "load_cell", "names no simulated bench"),
+        ("sim://a/motor", "sim://b/load_cell", "load_cell", "another simulated bench"),
+    ],
+)
+def test_ports_that_do_not_belong_together(padbench, tmp_path, motor, load_cell, line, words):
+    """`check` and every command say so; as a dry run the bench works, whatever its ports."""
+    path = changed_bench(tmp_path, motor={"port": motor}, load_cell={"port": load_cell})
+    at = 1 + path.read_text().splitlines().index(f"  port: {motor if line == 'motor' else load_cell}")
+    for command in (["check", "quick", "--bench", path], ["status", path]):
+        said = padbench(*command)
+        assert said.status == 2 and words in said.err and f"bench.yaml:{at}:" in said.err
+    said = padbench("status", path, "--simulated")
+    assert said.status == 0, said

@@ -352,3 +352,9 @@ class TestCommand:
 
     def test_it_is_a_command(self) -> None:
         assert "export" in COMMANDS
+
+
+@pytest.mark.parametrize("name", ["int", "double", "class", "restrict", "while"])
+def test_a_word_of_the_language_is_no_name(padbench, name):
+    said = padbench("export", "polyurethane", "--to", "c", "--name", name)
+    assert said.status == 2 and "a word of the language" in said.err and not said.out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +11,16 @@ import numpy as np
 import pytest
 
 from bench.config import Bench, load_bench, load_model
-from bench.errors import InputError, Refused
+from bench.errors import InputError, Refused, Stopped
 from bench.plan import allowed_force_speed, plan
 from bench.preflight import Preflight, check
 from bench.protocol import Protocol, load_protocol
 from bench.rates import force_latency_s, force_rate_Hz, motor_rate_Hz
+from bench.run.foresight import Foresight
 from bench.shipped import shipped_names
+from bench.trajectory import Profile
 from sim.model import Model
+from tests.bench.run.benches import bench_file
 
 LINEAR_N_mm = 4.0
 
@@ -303,3 +307,79 @@ def test_the_summary_has_a_row_a_step(bench: Bench) -> None:
     assert all(len(line) <= 90 for line in lines[:20])
     row = next(line for line in lines if line.startswith("steps[3].cycle[*].steps[0]"))
     assert row.split()[1:5] == ["4", "1.4", "mm", "20"]
+
+
+# -- a force that is no number ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("relaxation", [{}, {"shares": [0.25], "rates": [4.0]}])
+def test_a_pad_whose_force_is_no_number_is_refused(tmp_path: Path, bench: Bench, relaxation: Any) -> None:
+    """With modes infinity less infinity is no number, and no number is greater than a limit."""
+    steep = model({"law": "exponential", "m": 2.0, "b": 1e6}, **relaxation)
+    found = check(protocol(tmp_path, "{to: 1.0, speed: 40}", head="limits: {force: 9}\n"), bench, steep)
+    assert isinstance(found.refusal(), Refused) and "no finite force" in refusal(found)
+
+
+def test_nothing_is_simulated_with_a_force_that_is_no_number(padbench, csv) -> None:
+    Path("steep.yaml").write_text(
+        "pad:\n  elastic: {law: exponential, m: 2, b: 1e6}\n  relaxation: {shares: [0.25], rates: [4.0]}\n"
+    )
+    for motion in (("--like", csv), ("--protocol", "quick")):
+        said = padbench("simulate", "steep.yaml", *motion, "--out", "out.csv")
+        assert said.status == 2 and "no finite force" in said.err and not Path("out.csv").exists()
+
+
+def test_a_foreseen_force_that_is_no_number_stops_the_run(tmp_path: Path, bench: Bench) -> None:
+    planned = check(protocol(tmp_path, "{to: 1.0, speed: 40}", head="limits: {force: 9}\n"), bench).plan
+    steep = model({"law": "exponential", "m": 2.0, "b": 1e6}, shares=[0.25], rates=[4.0])
+    foresight = Foresight(steep, planned.limits)
+    foresight.start(0.0)
+    with pytest.raises(Stopped, match="not begun"):
+        foresight.allow("steps[0]", Profile(-0.1, 1.0, 40.0, 1000.0))
+
+
+# -- without end -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("steps", "head", "line"),
+    [
+        (["{to: 1, speed: 5}", "{to: 2, speed: 5, hold: 1e12}"], "", 4),
+        (["{to: 2, speed: 5, hold: 1e10}"], "", 3),
+        (["{to: 2, speed: 1e-8}"], "", 3),
+        (["{to_force: 2, speed: 1e-9}"], "limits: {depth: 2.5}\n", 4),
+        (["{to_force: 2, speed: 1, hold: 1e11, hold_mode: force}"], "limits: {depth: 2.5}\n", 4),
+        (["{to: 1, speed: 5}"], "finish: {air: 1e12}\n", 2),
+        (["{block: day, repeat: 30, steps: [{to: 1, speed: 5, hold: 86400}]}"], "", 3),
+    ],
+)
+def test_more_than_a_week_is_refused_where_it_stands(tmp_path, bench, steps, head, line) -> None:
+    """Whether it is one wait, a motion that hardly moves, or what is repeated."""
+    with pytest.raises(InputError, match="more than a week") as refused:
+        check(protocol(tmp_path, *steps, head=head), bench, model())
+    assert f"p.yaml:{line}:" in str(refused.value)
+
+
+def test_a_day_of_waiting_is_a_protocol(tmp_path: Path, bench: Bench) -> None:
+    assert check(protocol(tmp_path, "{to: 1, speed: 5, hold: 86400}"), bench).duration_s > 86400
+
+
+# -- rates that a run could not live with --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("sampling", "words"), [("{motor: 0.001}", "a motor sample every 1e.06 ms"), ("{load_cell: 2}", "make no tare")]
+)
+def test_rates_with_which_a_run_would_stop(tmp_path: Path, bench: Bench, sampling: str, words: str) -> None:
+    found = check(protocol(tmp_path, "{to: 1, speed: 5}", head=f"sampling: {sampling}\n"), bench, model())
+    error = found.refusal()
+    assert isinstance(error, InputError) and re.search(words, str(error)) and "p.yaml:2:" in str(error)
+
+
+@pytest.mark.parametrize(("speed", "passes"), [(5, True), (80, False)])
+def test_a_streamed_motor_that_hears_too_seldom(tmp_path: Path, speed: float, passes: bool) -> None:
+    """28 bytes of 11 bits at 19 200 baud are 16 ms at the least: 80 mm/s are 1.3 mm then, 0.5 mm allowed."""
+    slow = load_bench(bench_file(tmp_path, motor={"baudrate": 19200}))
+    found = check(protocol(tmp_path, f"{{to: 2, speed: {speed}}}", head="limits: {force: 15}\n"), slow, model())
+    assert (found.refusal() is None) == passes
+    assert passes or "behind: limits.following_error is 0.5 mm" in refusal(found)

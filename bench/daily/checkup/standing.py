@@ -61,8 +61,13 @@ def rates(bench: Bench, motor: MotorChannel, cell: ForceChannel) -> tuple[dict[s
             findings.append(Finding(f"{name} rate", shown))
         if steps.max() > bench.limits.stale:
             gap = f"{1e3 * steps.max():.0f} ms without a sample"
-            means = f"more than limits.stale ({1e3 * bench.limits.stale:.0f} ms): a run would have stopped there"
-            findings.append(Finding(f"{name} gaps", gap, False, means, CABLE))
+            stale_ms = 1e3 * bench.limits.stale
+            means = f"more than limits.stale ({stale_ms:.3g} ms): a run that looks at such a moment stops"
+            usual = float(np.median(steps)) > bench.limits.stale
+            do = (
+                f"set limits.stale to several times {1e3 * np.median(steps):.1f} ms, the usual time" if usual else CABLE
+            )
+            findings.append(Finding(f"{name} gaps", gap, False, means, do))
     return figures, findings
 
 

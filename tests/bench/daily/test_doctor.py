@@ -238,3 +238,26 @@ def test_an_answer_that_is_none_is_not_taken_for_a_no(padbench, monkeypatch, ans
     monkeypatch.setattr("sys.stdin", io.StringIO("perhaps\n"))
     said = padbench("doctor", "simulated", "--seconds", "1")
     assert said.status == 1 and "nobody answers" in said.err and "motor.direction" not in said.out
+
+
+def test_what_was_found_before_a_failure_is_told_with_it(padbench, tmp_path):
+    """There is no pad to press: rates, noise and the rest were measured all the same."""
+    path = bench_file(tmp_path, simulation={"surface": 1000.0})
+    said = padbench("doctor", path, "--yes", "--press", "--seconds", "3", "--json", "found.json")
+    assert said.status == 1 and "no contact" in said.err
+    assert "motor rate: " in said.out and "did not come to its end" in said.out
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert "no contact" in found["stopped"] and not found["well"]
+    assert found["figures"]["noise"]["rms_N"] == pytest.approx(0.01, rel=0.1)
+
+
+def test_a_limit_shorter_than_the_usual_time_between_samples_is_not_the_lines_fault():
+    """A run looks when something comes: it may pass, and nothing says that it would have stopped."""
+    t = np.arange(0.0, 1.0, 0.002)
+    none = np.full(t.size, np.nan)
+    motor, cell = MotorChannel(t, 0 * t, none, none, t), ForceChannel(t, 0 * t, 0 * t, t, np.zeros(t.size, bool))
+    bench = load_bench("simulated")
+    short = bench.model_copy(update={"limits": bench.limits.model_copy(update={"stale": 0.001})})
+    gaps = [finding for finding in standing.rates(short, motor, cell)[1] if "gaps" in finding.check]
+    assert [finding.check for finding in gaps] == ["motor gaps", "load_cell gaps"]
+    assert all("(1 ms)" in f.means and "would have stopped" not in f.means and "limits.stale to" in f.do for f in gaps)

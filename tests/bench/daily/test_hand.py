@@ -192,6 +192,15 @@ def test_tare_that_backs_off_finds_a_probe_that_touches(padbench, tmp_path):
     assert clear.status == 0 and "contact check, 0.50 mm back: passed" in clear.out
 
 
+@pytest.mark.parametrize("seconds", [3, 5])
+def test_tare_reads_as_long_as_it_is_told_also_after_backing_off(padbench, tmp_path, seconds):
+    """549 lines a second: 115 200 baud, 21 characters of ten bits."""
+    bench = bench_file(tmp_path, simulation={"surface": 1.0})
+    said = padbench("tare", bench, "--back-off", "0.5", "--seconds", seconds, "--json", "-")
+    found = json.loads(said.out)
+    assert found["samples"] == pytest.approx(seconds * 549, abs=10) and found["seconds"] == seconds
+
+
 def test_release_lets_go(padbench, monkeypatch):
     said = padbench("release", "simulated_iai")
     assert said.status == 0 and "without force" in said.out

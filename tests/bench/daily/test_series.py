@@ -7,6 +7,7 @@ import datetime
 import io
 import json
 import re
+import threading
 from collections.abc import Callable
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,12 +17,13 @@ import pytest
 import yaml
 
 import sim.world
+from bench import cli
 from bench.config import Bench
 from bench.daily import series as work
 from bench.daily.series_file import load_series
 from bench.daily.series_state import read_state
 from bench.daily.series_table import rows
-from bench.errors import InputError
+from bench.errors import InputError, Refused
 from bench.preflight import check
 from bench.recording import read_recording
 from tests.bench.run.benches import SHORT, bench_file, protocol_file
@@ -76,10 +78,14 @@ def person(answers: list[str], during: Callable[[int, float], None] = lambda tur
         assert answer in known, (question, answer)
         return answer
 
+    def analyse(folder: Path) -> None:
+        fitted.append(folder.name)
+        (folder / "report.html").touch()
+
     clock = clock or Clock()
     clock.rests = []
     made = work.Person(
-        ask=ask, say=said.append, rest=clock.rest, analyse=lambda folder: fitted.append(folder.name),
+        ask=ask, say=said.append, rest=clock.rest, analyse=analyse,
         progress=progress, now=lambda: clock.now,
     )  # fmt: skip
     return made, said, fitted
@@ -136,6 +142,58 @@ def test_leaving_and_going_on_another_day(tmp_path):
     assert statuses(path) == {"pad-1": "done", "pad 2": "skipped", "pad-3": "done"}
     made, said, fitted = person([])
     assert go(path, made)[0] and not fitted
+
+
+def test_a_run_that_was_measured_and_not_analysed_is_analysed_when_the_series_goes_on(tmp_path):
+    """Killed between the end of the recording and that of its report: its figures are made up for, once."""
+    path = list_file(tmp_path, samples=PADS[:1])
+    made, _, _ = person(["go"])
+
+    def killed(folder: Path) -> None:
+        raise KeyboardInterrupt
+
+    made.analyse = killed
+    with pytest.raises(KeyboardInterrupt):
+        go(path, made)
+    assert statuses(path) == {"pad-1": "done"}
+    made, said, fitted = person([])
+    assert go(path, made)[0] and fitted == ["pad-1"] and any("not analysed" in text for text in said)
+    made, said, fitted = person([])
+    assert go(path, made)[0] and fitted == []
+
+
+def test_two_series_on_one_list_do_not_measure_together(padbench, tmp_path, monkeypatch):
+    """The second begins while the first measures its first pad."""
+    path, begun, inside = list_file(tmp_path, samples=PADS[:1]), work.run_protocol, []
+
+    def slow(*given, **options):
+        monkeypatch.setattr(work, "run_protocol", begun)
+        with pytest.raises(Refused, match="another series"), work.held(tmp_path / "out"):
+            pytest.fail("two series have one folder")
+        other = threading.Thread(target=lambda: inside.append(cli.main(["series", str(path), "--yes"])))
+        other.start()
+        other.join()
+        return begun(*given, **options)
+
+    monkeypatch.setattr(work, "run_protocol", slow)
+    said = padbench("series", path, "--yes")
+    assert inside == [1] and said.status == 0, said
+    assert [child.name for child in (tmp_path / "out").iterdir() if child.is_dir()] == ["pad-1"]
+    assert statuses(path) == {"pad-1": "done"}
+
+
+def test_every_pad_is_fitted_with_the_structure_of_the_list(padbench, tmp_path):
+    """Of its own this pad is found to have another: pads compare in one structure only."""
+    path = list_file(tmp_path, samples=PADS[:1], law="power", order=1, contact="bonded")
+    assert padbench("series", path, "--yes").status == 0
+    fit = json.loads((tmp_path / "out/pad-1/fit.json").read_text())
+    assert (fit["law"], fit["order"], fit["contact"]) == ("power", 1, "bonded")
+
+
+@pytest.mark.parametrize("wrong", [{"law": "square"}, {"order": 0}, {"order": "two"}, {"contact": "glued"}])
+def test_a_structure_that_is_none_is_refused_before_anything_is_measured(padbench, tmp_path, wrong):
+    said = padbench("series", list_file(tmp_path, **wrong), "--yes")
+    assert said.status == 2 and f"{next(iter(wrong))}:" in said.err and not (tmp_path / "out").exists()
 
 
 def test_a_stopped_run_is_done_anew_from_its_beginning_and_both_are_kept(tmp_path):

@@ -10,6 +10,8 @@ import pytest
 
 from bench.errors import InputError
 from bench.recording import parse_columns, parse_units, read_recording
+from bench.recording.csv_file import read_csv
+from bench.recording.csv_text import read_table
 
 GOOD = "time_s,position_mm,force_N\n0,0,0.1\n0.001,0.5,0.2\n0.002,1.0,0.4\n"
 
@@ -203,3 +205,28 @@ def foreign(path: Path, topic: str, encoding: str) -> Path:
         writer.add_message(channel, 1, b'{"x": 1}', 1, 0)
         writer.finish()
     return path
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "kind"),
+    [
+        ("m.yaml", "pad:\n  elastic: {law: exponential, m: 2.24, b: 0.69}\n", "YAML"),
+        ("m.txt", "pad:\n  elastic: {law: exponential, m: 2.24, b: 0.69}\n", "YAML"),
+        ("p.csv", "# a protocol\nname: quick\nsteps:\n  - {to: 1, speed: 5}\n", "YAML"),
+        ("fit.json", '{"law": "exponential",\n "order": 2}\n', "JSON"),
+        ("fit.txt", '{"law": "exponential",\n "order": 2}\n', "JSON"),
+        ("report.csv", "<!doctype html>\n<p>a, b</p>\n", "HTML"),
+    ],
+)
+def test_another_kind_of_file_is_called_by_its_name(tmp_path, name, text, kind):
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InputError, match=f"is {kind}.*, and no measured data"):
+        read_csv(path)
+
+
+@pytest.mark.parametrize("header", ["time_s,position_mm,force_N", "time_s:,position_mm:,force_N:", '"time_s","x","F"'])
+def test_a_table_is_none_of_them(tmp_path, header):
+    path = tmp_path / "data.txt"
+    path.write_text(f"{header}\n0,0,0\n1,1,1\n")
+    assert len(read_table(path).rows) == 2

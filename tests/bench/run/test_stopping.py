@@ -21,8 +21,9 @@ from bench.recording import read_recording
 from bench.run import script
 from bench.run.axis import SEGMENT_S
 from bench.run.loop import LONGEST_WAIT_S
-from bench.run.runner import run_protocol
+from bench.run.runner import _foresight, run_protocol
 from bench.run.signals import Operator, listening
+from bench.trajectory import Profile
 from drivers.clock import WallClock
 from drivers.errors import ReadbackError
 from sim.devices import orca_registers
@@ -385,11 +386,23 @@ def started(folder: Any, protocol: Any, believed: str, **changes: Any) -> tuple[
     return run_protocol(loaded, bench, plan, out, believed_text=believed), read_recording(out)
 
 
-def believed_pad(m: float, contact: str = "unilateral") -> str:
+def believed_pad(m: float | str, contact: str = "unilateral") -> str:
     return (
         f"pad:\n  elastic: {{law: exponential, m: {m}, b: 0.69}}\n"
         f"  relaxation: {{shares: [0.25], rates: [4.0]}}\n  contact: {contact}\n"
     )
+
+
+@pytest.mark.parametrize("m", ["010", "10e0"])
+def test_the_believed_pad_is_read_as_every_command_reads_it(tmp_path, m):
+    """YAML 1.1 has the first as eight, and the second as a word."""
+    plan = check(load_protocol(protocol_file(tmp_path, SHORT)), load_bench(bench_file(tmp_path)), None).plan
+    foreseen, wanted = (_foresight(believed_pad(value), plan) for value in (m, "10"))
+    assert foreseen is not None and wanted is not None
+    curve = Profile(0.0, 1.0, 10.0, 100.0, None)
+    for foresight in (foreseen, wanted):
+        foresight.start(0.0)
+    assert foreseen.extremes(curve) == wanted.extremes(curve)
 
 
 def test_a_ramp_that_is_expected_to_cross_the_limit_is_not_begun(tmp_path):
