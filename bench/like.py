@@ -6,6 +6,9 @@ not to the model; so whoever compares a model with a run finds it again, for thi
 Reported positions are noisy, and coarse in fast moves. A diagnosis runs its models on the motion as the pad felt it
 (`bench.felt_motion`), a fit on the positions as they are. Both ways are tried, and the motion as felt counts where it
 serves the model clearly better.
+
+What a run took for zero (its tare) counts as zero of the model too, as in a diagnosis: friction or a bias that the load
+cell felt before contact is not in its net force.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from bench.errors import InputError
 from bench.felt_motion import felt
 from bench.recording.types import Measurement
 from sim.model import Model
+from sim.pad import union
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -109,8 +113,14 @@ def _along(model: Model, measurement: Measurement, time_s: Array, position_mm: A
     counted = measurement.counted() & ~flagged
     measured = measurement.force_N[counted]
 
+    stamps_s, at = union(time_s, measurement.force_time_s)
+    tared = _tared(measurement, stamps_s)
+    if not tared.any():
+        stamps_s, at = measurement.force_time_s, np.arange(measurement.force_time_s.size)
+
     def force(moved_mm: float) -> Array:
-        return model.simulate_at(time_s, position_mm + moved_mm, measurement.force_time_s)
+        simulated = model.simulate_at(time_s, position_mm + moved_mm, stamps_s)
+        return simulated[at] - float(np.mean(simulated[tared])) if tared.any() else simulated
 
     def square(moved_mm: float) -> float:
         return float(np.sum((measured - force(moved_mm)[counted]) ** 2))
@@ -122,6 +132,13 @@ def _along(model: Model, measurement: Measurement, time_s: Array, position_mm: A
         V = square(moved_mm) / measured.size
         moved_mm = _least(lambda s: square(s) + V * (s / std) ** 2, std)
     return _of(measurement, force(moved_mm), moved_mm, flagged)
+
+
+def _tared(measurement: Measurement, stamps_s: Array) -> Mask:
+    """Of the stamps (k,), those within the tare; of all stamps, as a diagnosis has it, and not of the forces' alone."""
+    if measurement.tared_s is None:
+        return np.zeros(stamps_s.size, dtype=bool)
+    return (stamps_s >= measurement.tared_s[0]) & (stamps_s <= measurement.tared_s[1])
 
 
 def _of(measurement: Measurement, simulated_N: Array, moved_mm: float, flagged: Mask) -> Likeness:
