@@ -151,6 +151,10 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     if not inside.all():
         m = replace(m, force_time_s=m.force_time_s[inside], force_N=m.force_N[inside])
         good = good[inside]
+    if m.counted().any() and not np.ptp(m.force_N[m.counted()]):
+        level = float(m.force_N[m.counted()][0])
+        said = f"the force is {f'{level:.6g} N' if level else 'zero'} throughout"
+        raise InputError(m.name, said, "Is the force channel connected, its column right?")
     counted = m.counted() & good
     if counted.sum() < FEWEST:
         raise InputError(
