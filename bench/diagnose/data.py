@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bench.errors import InputError
 from bench.felt_motion import felt, resolution
 from bench.identify.noise import stiffness_along
+from bench.identify.problem import touches
 from bench.recording.types import Measurement
 from sim.jit import compiled
 from sim.pad import union
@@ -155,6 +156,12 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
         level = float(m.force_N[m.counted()][0])
         said = f"the force is {f'{level:.6g} N' if level else 'zero'} throughout"
         raise InputError(m.name, said, "Is the force channel connected, its column right?")
+    if m.surface_std_mm > 0 and not touches(m):  # with a surface found by touch-off there is a pad
+        raise InputError(
+            m.name,
+            "the probe is never in the pad where the force counts",
+            "Was the run stopped before its first step reached the pad?",
+        )
     counted = m.counted() & good
     if counted.sum() < FEWEST:
         raise InputError(

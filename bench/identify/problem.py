@@ -22,6 +22,7 @@ from .runs import Run
 __all__ = ["Problem", "Run", "build"]
 
 PIECE = 1 << 17  # samples looked at at once
+SURELY = 3.0  # standard deviations of the surface beyond which a depth is one
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,8 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
 
     `between`: with nodes where the motion between samples matters; `blocks`: very long runs as block means.
     Raises InputError, naming the measurement, where there is nothing to fit: fewer than 20 force samples that count,
-    no sample deeper than the surface, no force at all, numbers that are not finite, times that do not increase.
+    no sample deeper than the surface (while the force counts), no force at all, numbers that are not finite, times
+    that do not increase.
     """
     if not measurements:
         raise InputError("fit", "no measurement given")
@@ -102,6 +104,9 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
     if depth <= 0:
         raise InputError(names, "the position never passes the surface (0 mm), so there is no contact to fit",
                          "Is the sign of the position right, and its zero at the surface?")  # fmt: skip
+    if not any(touches(m) for m in checked):
+        raise InputError(names, "the probe is never in the pad where the force counts, so there is no contact to fit",
+                         "Was the run stopped before its first step reached the pad?")  # fmt: skip
     if force <= 0:
         raise InputError(names, "the force is zero throughout", "Is the force channel connected, its column right?")
     runs: list[Run] = []
@@ -123,6 +128,17 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
         tuple(runs), depth, force, tuple(checked), tuple(where), tuple(notes),
         rebuilt=in_moves + in_all > 0, moves_rebuilt=in_moves > 0,
     )  # fmt: skip
+
+
+def touches(m: Measurement) -> bool:
+    """Whether the probe is deeper than the surface, beyond its doubt, while the force counts."""
+    counted = m.counted()
+    if not counted.any():
+        return False
+    first, last = int(np.argmax(counted)), len(counted) - 1 - int(np.argmax(counted[::-1]))
+    begin = int(np.searchsorted(m.position_time_s, m.force_time_s[first]))
+    end = int(np.searchsorted(m.position_time_s, m.force_time_s[last], side="right"))
+    return float(np.max(m.position_mm[begin:end], initial=-np.inf)) > SURELY * m.surface_std_mm
 
 
 def _counted(m: Measurement) -> NDArray[np.bool_]:
