@@ -26,6 +26,7 @@ from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import NEAR
 from bench.errors import InputError
 from bench.felt_motion import felt
+from bench.identify.problem import sized
 from bench.recording.types import Measurement
 from sim.model import Model
 from sim.pad import union
@@ -86,9 +87,11 @@ class Likeness:
 def likeness(model: Model, measurement: Measurement) -> Likeness:
     """The model's force over the measured motion, from rest.
 
-    Where touch-off stated a doubt, the surface is moved: the shift s with the least Σ e² + V (s/std)², V being the mean
-    square error at the best s without that prior. Positions whose surface is certain (CSV) are taken as they are.
+    Where touch-off stated a doubt, the surface is moved: the shift s with the least Σ e² + V (s/std)², V being the
+    mean square error at the best s without that prior. Positions whose surface is certain (CSV) are taken as they are.
+    Raises InputError for numbers that are none of a bench.
     """
+    sized(measurement)
     alone = faults(measurement.force_N)
     flagged = ~alone.good
     found = [_along(model, measurement, *path, flagged) for path in _paths(measurement)]

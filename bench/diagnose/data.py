@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bench.errors import InputError
 from bench.felt_motion import felt, resolution
 from bench.identify.noise import stiffness_along
-from bench.identify.problem import touches
+from bench.identify.problem import sized, touches
 from bench.recording.types import Measurement
 from sim.jit import compiled
 from sim.pad import union
@@ -152,6 +152,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     if not inside.all():
         m = replace(m, force_time_s=m.force_time_s[inside], force_N=m.force_N[inside])
         good = good[inside]
+    sized(m)
     if m.counted().any() and not np.ptp(m.force_N[m.counted()]):
         level = float(m.force_N[m.counted()][0])
         said = f"the force is {f'{level:.6g} N' if level else 'zero'} throughout"
