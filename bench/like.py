@@ -6,6 +6,9 @@ not to the model; so whoever compares a model with a run finds it again, for thi
 Reported positions are noisy, and coarse in fast moves. A diagnosis runs its models on the motion as the pad felt it
 (`bench.felt_motion`), a fit on the positions as they are. Both ways are tried, and the motion as felt counts where it
 serves the model clearly better.
+
+What a run took for zero (its tare) counts as zero of the model too, as in a diagnosis: friction or a bias that the load
+cell felt before contact is not in its net force. The tare's own error is found again within its doubt, as the surface is.
 """
 
 from __future__ import annotations
@@ -23,9 +26,11 @@ from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import NEAR
 from bench.errors import InputError
 from bench.felt_motion import felt
+from bench.identify.problem import sized
 from bench.recording.types import Measurement
 from bench.restamp import restamped
 from sim.model import Model
+from sim.pad import union
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -35,6 +40,9 @@ FARTHEST = 6.0
 
 CLOSE = 1e-4
 """Standard deviations to which the best place is found."""
+
+MOST_ZERO = 4.0
+"""How far off a tare may be, in its standard deviations."""
 
 CLEARLY = 0.005
 """Share of the error by which the motion as felt must be better than the positions as they are."""
@@ -83,9 +91,11 @@ class Likeness:
 def likeness(model: Model, measurement: Measurement) -> Likeness:
     """The model's force over the measured motion, from rest.
 
-    Where touch-off stated a doubt, the surface is moved: the shift s with the least Σ e² + V (s/std)², V being the mean
-    square error at the best s without that prior. Positions whose surface is certain (CSV) are taken as they are.
+    Where touch-off stated a doubt, the surface is moved: the shift s with the least Σ e² + V (s/std)², V being the
+    mean square error at the best s without that prior. Positions whose surface is certain (CSV) are taken as they are.
+    Raises InputError for numbers that are none of a bench.
     """
+    sized(measurement)
     alone = faults(measurement.force_N)
     flagged = ~alone.good
     found = [_along(model, measurement, *path, flagged) for path in _paths(measurement)]
@@ -114,8 +124,15 @@ def _along(
     counted = measurement.counted() & ~flagged
     measured = measurement.force_N[counted]
 
+    stamps_s, at = union(time_s, stamp_s)
+    tared = _tared(measurement, stamps_s)
+    if not tared.any():
+        stamps_s, at = stamp_s, np.arange(stamp_s.size)
+
     def force(moved_mm: float) -> Array:
-        return model.simulate_at(time_s, position_mm + moved_mm, stamp_s)
+        simulated = model.simulate_at(time_s, position_mm + moved_mm, stamps_s)
+        own = simulated[at] - float(np.mean(simulated[tared])) if tared.any() else simulated
+        return own + _zero_N(measured - own[counted], measurement.zero_std_N)
 
     def square(moved_mm: float) -> float:
         return float(np.sum((measured - force(moved_mm)[counted]) ** 2))
@@ -127,6 +144,21 @@ def _along(
         V = square(moved_mm) / measured.size
         moved_mm = _least(lambda s: square(s) + V * (s / std) ** 2, std)
     return _of(measurement, force(moved_mm), moved_mm, flagged)
+
+
+def _zero_N(error_N: Array, std_N: float) -> float:
+    """What the force reads without load: the tare's own error, as far as the errors (n,) and its doubt say."""
+    V = float(np.mean(error_N**2)) if error_N.size else 0.0
+    if not (std_N > 0.0 and V > 0.0 and math.isfinite(V)):
+        return 0.0
+    return float(np.clip(np.sum(error_N) / (error_N.size + V / std_N**2), -MOST_ZERO * std_N, MOST_ZERO * std_N))
+
+
+def _tared(measurement: Measurement, stamps_s: Array) -> Mask:
+    """Of the stamps (k,), those within the tare; of all stamps, as a diagnosis has it, and not of the forces' alone."""
+    if measurement.tared_s is None:
+        return np.zeros(stamps_s.size, dtype=bool)
+    return (stamps_s >= measurement.tared_s[0]) & (stamps_s <= measurement.tared_s[1])
 
 
 def _of(measurement: Measurement, simulated_N: Array, moved_mm: float, flagged: Mask) -> Likeness:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bench.errors import InputError
 from bench.felt_motion import felt, resolution
 from bench.identify.noise import stiffness_along
+from bench.identify.problem import sized, touches
 from bench.recording.types import Measurement
 from bench.restamp import restamped
 from sim.jit import compiled
@@ -178,6 +179,17 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     if not inside.all():
         m = replace(m, force_time_s=m.force_time_s[inside], force_N=m.force_N[inside])
         good = good[inside]
+    sized(m)
+    if m.counted().any() and not np.ptp(m.force_N[m.counted()]):
+        level = float(m.force_N[m.counted()][0])
+        said = f"the force is {f'{level:.6g} N' if level else 'zero'} throughout"
+        raise InputError(m.name, said, "Is the force channel connected, its column right?")
+    if m.surface_std_mm > 0 and not touches(m):  # with a surface found by touch-off there is a pad
+        raise InputError(
+            m.name,
+            "the probe is never in the pad where the force counts",
+            "Was the run stopped before its first step reached the pad?",
+        )
     counted = m.counted() & good
     if counted.sum() < FEWEST:
         raise InputError(

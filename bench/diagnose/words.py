@@ -41,6 +41,8 @@ SHOWN = 6
 """Numbers of one cause that a terminal shows."""
 NEAR = 0.5
 """Share of the gain from which an excluded rival is worth a word."""
+LEAST = 0.01
+"""Share of the gain below which its size says no more."""
 REMAINS = 3
 """Sentences on what is left."""
 
@@ -84,7 +86,8 @@ def verdict(d: Diagnosis) -> str:
     if d.verdict == "explained":
         return f"What {'the bench adds' if in_air(d) else 'the model gets wrong'} is explained by {named(d)}"
     if d.causes:
-        return f"Unexplained: {named(d)} takes {percent(1 - d.left)} of the error, no known cause the rest"
+        verb = "takes" if len(d.causes) == 1 else "take"
+        return f"Unexplained: {named(d)} {verb} {percent(1 - d.left)} of the error, no known cause the rest"
     return "Unexplained: no known cause takes what is left"
 
 
@@ -147,12 +150,17 @@ def rivals(cause: CauseFound) -> str:
     """What else it could be, in one sentence; empty where nothing comes near."""
     open_ = doubtful(cause)
     if open_:
-        said = ", ".join(f"{name_of(a.id)} ({percent(a.gain_share)} of the gain)" for a in open_)
+        said = ", ".join(f"{name_of(a.id)} ({gain(a)} of the gain)" for a in open_)
         return f"these data cannot exclude: {said}"
     near = [a for a in cause.alternatives if a.gain_share >= NEAR]
     if near:
         return f"excluded, though near: {name_of(near[0].id)} ({percent(near[0].gain_share)} of the gain)"
     return ""
+
+
+def gain(rival: Alternative) -> str:
+    """Share of the cause's gain that a rival reaches; a share next to none has no digits worth reading."""
+    return percent(rival.gain_share) if rival.gain_share >= LEAST else f"under {percent(LEAST)}"
 
 
 def numbers(cause: CauseFound, most: int = SHOWN) -> str:

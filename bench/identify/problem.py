@@ -22,6 +22,8 @@ from .runs import Run
 __all__ = ["Problem", "Run", "build"]
 
 PIECE = 1 << 17  # samples looked at at once
+LARGEST = 1e12  # N, mm, s: what is beyond is no measurement, and its square soon no number
+SURELY = 3.0  # standard deviations of the surface beyond which a depth is one
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
 
     `between`: with nodes where the motion between samples matters; `blocks`: very long runs as block means.
     Raises InputError, naming the measurement, where there is nothing to fit: fewer than 20 force samples that count,
-    no sample deeper than the surface, no force at all, numbers that are not finite, times that do not increase.
+    no sample deeper than the surface (while the force counts), no force at all, numbers that are not finite, times
+    that do not increase; and for numbers that are none of a bench (`sized`).
     """
     if not measurements:
         raise InputError("fit", "no measurement given")
@@ -102,6 +105,9 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
     if depth <= 0:
         raise InputError(names, "the position never passes the surface (0 mm), so there is no contact to fit",
                          "Is the sign of the position right, and its zero at the surface?")  # fmt: skip
+    if not any(touches(m) for m in checked):
+        raise InputError(names, "the probe is never in the pad where the force counts, so there is no contact to fit",
+                         "Was the run stopped before its first step reached the pad?")  # fmt: skip
     if force <= 0:
         raise InputError(names, "the force is zero throughout", "Is the force channel connected, its column right?")
     runs: list[Run] = []
@@ -123,6 +129,38 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
         tuple(runs), depth, force, tuple(checked), tuple(where), tuple(notes),
         rebuilt=in_moves + in_all > 0, moves_rebuilt=in_moves > 0,
     )  # fmt: skip
+
+
+def touches(m: Measurement) -> bool:
+    """Whether the probe is deeper than the surface, beyond its doubt, while the force counts."""
+    counted = m.counted()
+    if not counted.any():
+        return False
+    first, last = int(np.argmax(counted)), len(counted) - 1 - int(np.argmax(counted[::-1]))
+    begin = int(np.searchsorted(m.position_time_s, m.force_time_s[first]))
+    end = int(np.searchsorted(m.position_time_s, m.force_time_s[last], side="right"))
+    return float(np.max(m.position_mm[begin:end], initial=-np.inf)) > SURELY * m.surface_std_mm
+
+
+def sized(m: Measurement) -> None:
+    """Raises InputError, naming the measurement, for numbers too large, or forces too small, to be those of a bench."""
+    cure = "Are the columns and their units right (`--columns`, `--units`)?"
+    span_s = float(m.position_time_s[-1] - m.position_time_s[0])
+    largest = _extreme(m.force_N)
+    for value, said in (
+        (largest, f"a force of {largest:.3g} N"),
+        (_extreme(m.position_mm), f"a position of {_extreme(m.position_mm):.3g} mm"),
+        (span_s, f"a time of {span_s:.3g} s from first to last"),
+    ):
+        if value > LARGEST:
+            raise InputError(m.name, f"holds {said}", cure)
+    if 0 < largest < 1 / LARGEST:
+        raise InputError(m.name, f"holds no force beyond {largest:.3g} N", cure)
+
+
+def _extreme(values: Array) -> float:
+    """The largest magnitude, of any sign."""
+    return max(float(np.max(values, initial=0.0)), -float(np.min(values, initial=0.0)))
 
 
 def _counted(m: Measurement) -> NDArray[np.bool_]:
@@ -151,6 +189,7 @@ def _checked(m: Measurement, notes: list[str]) -> Measurement:
         raise InputError(m.name, "there are numbers that are not finite among the samples")
     if any(np.any(np.diff(piece) <= 0) for t in (m.position_time_s, m.force_time_s) for piece in _pieces(t)):
         raise InputError(m.name, "times do not increase from sample to sample")
+    sized(m)
     inside = (m.force_time_s >= m.position_time_s[0]) & (m.force_time_s <= m.position_time_s[-1])
     if not inside.all():
         lost = int((~inside).sum())

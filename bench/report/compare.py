@@ -20,7 +20,9 @@ from bench.report.view import Curve, FitView
 Runs = Sequence[tuple[str, FitView]]
 
 ALIKE = 0.01
-"""Parameters differ where equal ones would scatter so far in less than this share of cases."""
+"""Parameters differ where equal ones would scatter so far in less than this share of cases …"""
+DOUBTFUL = 0.05
+"""… and are in doubt below this share, which is that of the intervals drawn: 95 % bars may then miss one another."""
 
 
 def write_comparison(path: Path, runs: Runs, *, title: str = "Comparison of runs") -> None:
@@ -118,8 +120,10 @@ def agreement(entries: Sequence[tuple[int, float, float, str, bool]]) -> str:
     mean = float(weight @ value / weight.sum())
     chi2 = float(weight @ (value - mean) ** 2)
     chance = float(chdtrc(len(voting) - 1, chi2))
-    if chance >= ALIKE:
+    if chance >= DOUBTFUL:
         return "yes, within their uncertainty"
+    if chance >= ALIKE:
+        return f"perhaps: equal ones scatter so far in {digits(100 * chance, 2)} % of cases"
     spread = f", spread {digits(100 * float(np.ptp(value)) / abs(mean), 2)} %" if mean else ""
     return f"no{spread}, χ² {digits(chi2, 3)} of {len(voting) - 1}"
 

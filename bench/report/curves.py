@@ -27,7 +27,12 @@ MOST_POINTS = 12_000
 
 
 def indentation(recording: Recording, fit: FitView | None) -> str:
-    """Force against depth, measured coloured from early to late, simulated over it; empty without both channels."""
+    """Force against depth, measured coloured from early to late, simulated over it; empty without both channels.
+
+    Empty also without a pad: in air there is no indentation, and the force is noise alone.
+    """
+    if recording.run and not has_surface(recording):
+        return ""
     time_s, depth, measured = _in_pad_frame(recording, fit)
     if time_s.size < 2 or not (np.isfinite(depth) & np.isfinite(measured)).any():
         return ""
@@ -54,7 +59,7 @@ def indentation(recording: Recording, fit: FitView | None) -> str:
         deepest, highest = float(np.nanmax(depth)), float(np.nanmin(depth))
         if deepest > 0.05 * (deepest - highest):  # the way through air says little: only its end is shown
             ax.set_xlim(max(highest - 0.01 * deepest, -0.12 * deepest), 1.02 * deepest)
-        ax.set_xlabel("depth, mm" if has_surface(recording) else "motor position, mm")
+        ax.set_xlabel("depth, mm")
         ax.set_ylabel("force, N")
         _time_bar(ax, time_s)
         if fit is not None:

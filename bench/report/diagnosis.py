@@ -17,6 +17,9 @@ from bench.report.markup import figure, folded, measured, section, table
 
 __all__ = ["card", "sections", "write_diagnosis"]
 
+RAREST = 0.0001
+"""Probability of a test's finding by chance, below which its size says no more."""
+
 TONES = {"consistent": "good", "explained": "good", "unexplained": "bad"}
 
 
@@ -48,19 +51,22 @@ def _subtitle(d: Diagnosis) -> str:
     return f"{d.time_s.size} force samples over {markup.digits(float(d.time_s[-1] - d.time_s[0]), 3)} s"
 
 
-def card(d: Diagnosis, heading: str = "", *, notes: bool = True) -> str:
-    """The verdict in words, with the numbers to see first; without the notes on the data where they stand elsewhere."""
+def card(d: Diagnosis, heading: str = "", *, notes: bool = True, remark: str = "") -> str:
+    """The verdict in words, with the numbers to see first; without the notes on the data where they stand elsewhere.
+
+    `remark`: a sentence under the numbers.
+    """
     tone = "fair" if d.verdict == "unexplained" and d.causes else TONES.get(d.verdict, "plain")
     said = [_sentence(cause.explanation) for cause in d.causes]
     said.append(" ".join(_sentence(words_) for words_ in words.remains(d)) if d.verdict != "consistent" else "")
     if d.verdict == "unexplained":
         said.append("No cause of the catalogue does this: look at what remains before trusting the model.")
     paragraphs = "".join(f"<p>{markup.text(sentence)}</p>" for sentence in said if sentence)
-    tiles = [
-        ("error on held-out data, before", words.force(d.held_out_before)),
-        ("after", words.force(d.held_out_after)),
-        ("noise floor", words.force(d.noise_floor)),
-    ]
+    before = "error on held-out data, before" if d.causes else "error on held-out data"
+    tiles = [(before, words.force(d.held_out_before))]
+    if d.causes:
+        tiles.append(("after", words.force(d.held_out_after)))
+    tiles.append(("noise floor", words.force(d.noise_floor)))
     if d.causes:
         tiles.append(("of the error explained", words.percent(max(1.0 - d.left, 0.0))))
     if d.flagged_fraction > 0:
@@ -68,7 +74,8 @@ def card(d: Diagnosis, heading: str = "", *, notes: bool = True) -> str:
     top = heading or words.verdict(d)
     heard = markup.bullets(d.notes, "warn") if notes else ""
     return (
-        f'<section class="verdict {tone}"><h2>{markup.text(top)}</h2>{paragraphs}{markup.tiles(tiles)}{heard}'
+        f'<section class="verdict {tone}"><h2>{markup.text(top)}</h2>{paragraphs}{markup.tiles(tiles)}'
+        f"{f'<p>{markup.text(remark)}</p>' if remark else ''}{heard}"
         "</section>\n"
     )
 
@@ -129,24 +136,31 @@ def _residuals(d: Diagnosis) -> str:
         "Measured minus simulated: above with the model believed, its numbers refitted; below with the causes named "
         "and all numbers refitted together. Each on its own scale; the band is what noise alone makes."
     )
+    if not d.causes:
+        said = (
+            "Measured minus simulated, with the model believed, its numbers refitted. The band is what noise alone "
+            "makes."
+        )
     body = figure(plots.residuals(d), said)
     chosen = best_view(d)
     if chosen is not None:
         share = words.percent(chosen.share)
-        said = f"Of all views tried this one shows the cause best: means take {share} of the residual before."
+        residual = "the residual before" if d.causes else "the residual"
+        what = "the cause best" if d.causes else "most"
+        said = f"Of all views tried this one shows {what}: means take {share} of {residual}."
         if chosen.name == "frequency":
-            said = f"The line takes {share} of the residual before."
-        body += f"<h3>By {markup.text(chosen.name)}</h3>" + figure(plots.view(chosen), f"{said} {chosen.said}")
+            said = f"The line takes {share} of {residual}."
+        svg = plots.view(chosen, named=bool(d.causes))
+        body += f"<h3>By {markup.text(chosen.name)}</h3>" + figure(svg, f"{said} {chosen.said}")
     return body
 
 
 def _held_out(d: Diagnosis) -> str:
     if not (math.isfinite(d.held_out_before) and math.isfinite(d.held_out_after)):
         return ""
-    said = (
-        "Every stretch of the data as predicted by numbers that were not fitted to it. Flagged samples count before, "
-        "and are left out after."
-    )
+    said = "Every stretch of the data as predicted by numbers that were not fitted to it."
+    if d.causes:
+        said += " Flagged samples count before, and are left out after."
     return figure(plots.held_out(d), said)
 
 
@@ -164,11 +178,16 @@ def _remains(d: Diagnosis) -> str:
     if not d.remainders:
         return ""
     told = [r for r in d.remainders if r.passed]
-    rows = [(r.name, f"What is left {r.sentence}", words.percent(r.share), f"{r.p_value:.1g}") for r in told]
+    rows = [(r.name, f"What is left {r.sentence}", words.percent(r.share), chance(r.p_value)) for r in told]
     found = f"{len(told)} found some" if told else "none found any"
     made = f"{len(d.remainders)} tests looked for structure in what is left; {found}."
     body = f"<p>{markup.text(made)}</p>"
     return body + table(["test", "finding", "of its power", "chance"], rows, numeric=(2, 3))
+
+
+def chance(p_value: float) -> str:
+    """A probability for reading: what is hardly more than none is not said to be none."""
+    return f"{p_value:.1g}" if p_value >= RAREST else f"< {RAREST:g}"
 
 
 def _next_test(d: Diagnosis) -> str:

@@ -47,8 +47,9 @@ def flagged(d: Diagnosis) -> NDArray[np.bool_]:
 
 
 def residuals(d: Diagnosis) -> str:
-    """Residual before and after over time, on one scale, with the noise band and the flagged samples."""
-    heights = [170.0, 130.0]
+    """Residual over time with the noise band and the flagged samples; where a cause is named also what is left then."""
+    named = bool(d.causes)
+    heights = [170.0, 130.0] if named else [170.0]
     before, after = d.force_N - d.before_N, d.force_N - d.after_N
     shown = d.counted if d.counted.any() else np.ones(len(d.time_s), dtype=bool)
     bad = flagged(d)
@@ -58,10 +59,10 @@ def residuals(d: Diagnosis) -> str:
     def draw(figure: Figure) -> None:
         made = parts.panels(figure, heights)
         made[0].set_xlim(float(d.time_s[0]), float(d.time_s[-1]))
-        for ax, left, colour, label in (
-            (made[0], before, BEFORE, "before: as believed, refitted"),
-            (made[1], after, AFTER, "after: with the causes named"),
-        ):
+        shows = [(before, BEFORE, "before: as believed, refitted" if named else "as believed, refitted")]
+        if named:
+            shows.append((after, AFTER, "after: with the causes named"))
+        for ax, (left, colour, label) in zip(made, shows, strict=True):
             top = 1.12 * max(float(np.nanmax(np.abs(left[shown & ~bad]), initial=0.0)), 2.4 * d.noise_floor)
             history = ~(shown | bad)
             if history.any():
@@ -75,7 +76,8 @@ def residuals(d: Diagnosis) -> str:
             parts.legend(ax)
         made[-1].set_xlabel("time, s")
 
-    return render("residuals", "Residual over time, before and after", parts.WIDE, parts.stacked(heights), draw)
+    title = "Residual over time, before and after" if named else "Residual over time"
+    return render("residuals", title, parts.WIDE, parts.stacked(heights), draw)
 
 
 def _marks(ax: Axes, time_s: Array, left: Array, bad: NDArray[np.bool_], top: float) -> None:
@@ -87,8 +89,8 @@ def _marks(ax: Axes, time_s: Array, left: Array, bad: NDArray[np.bool_], top: fl
     ax.plot(time_s[at], y, "x", color=light("event"), ms=4, label="flagged, left out", zorder=4)
 
 
-def view(chosen: View) -> str:
-    """Mean residual before and after, group by group, against what shows the cause best."""
+def view(chosen: View, *, named: bool = True) -> str:
+    """Mean residual before and after, group by group, against what shows the cause best; `named`: a cause is."""
     heights = [240.0]
     values = [np.abs(np.concatenate([s.before_N, s.after_N])) for s in chosen.series]
     scale, unit = _scaled(max((float(np.nanmax(v, initial=0.0)) for v in values), default=1.0))
@@ -99,8 +101,9 @@ def view(chosen: View) -> str:
         [ax] = parts.panels(figure, heights, top=top)
         styles, marks = ("-", "--", ":"), ("o", "s", "^")
         for number, s in enumerate(chosen.series):
-            for left, colour, word in ((s.before_N, BEFORE, "before"), (s.after_N, AFTER, "after")):
-                label = f"{word}, {s.label}" if s.label else word
+            both = [(s.before_N, BEFORE, "before"), (s.after_N, AFTER, "after")]
+            for left, colour, word in both if named else [(s.before_N, BEFORE, "")]:
+                label = ", ".join(part for part in (word, s.label) if part) or "_nolegend_"
                 if spectrum:
                     parts.line(ax, s.x, left * scale, colour, label, width=0.9)
                     continue
@@ -118,7 +121,8 @@ def view(chosen: View) -> str:
         ax.set_ylabel(f"{'amplitude' if spectrum else 'mean residual'}, {unit}")
         ax.set_xlabel(chosen.axis)
         columns = max(len(chosen.series), 2)
-        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.01), ncols=columns, columnspacing=1.4, handlelength=2.2)
+        if ax.get_legend_handles_labels()[0]:
+            ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.01), ncols=columns, columnspacing=1.4, handlelength=2.2)
 
     return render("view", f"Residual against {chosen.axis}", parts.WIDE, parts.stacked(heights, top), draw)
 
@@ -153,14 +157,16 @@ def candidates(d: Diagnosis) -> str:
 
 
 def held_out(d: Diagnosis) -> str:
-    """Held-out error before and after, with the noise floor."""
+    """Held-out error, before and after where a cause is named, with the noise floor."""
     scale, unit = _scaled(max(d.held_out_before, d.held_out_after))
     rows = [("before", d.held_out_before, BEFORE), ("after", d.held_out_after, AFTER)]
-    height = 60.0
+    if not d.causes:
+        rows = [("as believed", d.held_out_before, BEFORE)]
+    height = 30.0 * len(rows)
 
     def draw(figure: Figure) -> None:
         width, total = figure.get_figwidth() * figure.dpi, figure.get_figheight() * figure.dpi
-        ax = figure.add_axes((70.0 / width, 42.0 / total, (width - 150.0) / width, height / total))
+        ax = figure.add_axes((90.0 / width, 42.0 / total, (width - 170.0) / width, height / total))
         for place, (_, value, colour) in enumerate(rows):
             ax.barh(-place, value * scale, height=0.62, color=light(colour), lw=0)
             ax.annotate(
@@ -168,8 +174,8 @@ def held_out(d: Diagnosis) -> str:
                 va="center", fontsize=10, color=light("ink"),
             )  # fmt: skip
         ax.axvline(d.noise_floor * scale, color=light("noise"), lw=1.6, ls="--", label="noise floor")
-        ax.set_yticks([0, -1], [name for name, _, _ in rows])
-        ax.set_ylim(-1.5, 0.5)
+        ax.set_yticks(range(0, -len(rows), -1), [name for name, _, _ in rows])
+        ax.set_ylim(0.5 - len(rows), 0.5)
         ax.set_xlim(0.0, 1.12 * max(d.held_out_before, d.held_out_after, 1e-6) * scale)
         ax.set_xlabel(f"error on data held out, rms, {unit}")
         ax.tick_params(axis="y", length=0)

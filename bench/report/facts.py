@@ -229,7 +229,18 @@ def touch_off(recording: Recording) -> str:
 
 
 def _event_data(event: Event) -> str:
-    return ", ".join(markup.named(key, _word(value)) for key, value in event.data.items())
+    return ", ".join(markup.named(key, _figure(key, value)) for key, value in event.data.items())
+
+
+def _figure(key: str, value: Any) -> str:
+    """A value of an event with no more digits than a bench can tell: forces to three, or 1 mN; positions to 0.1 µm."""
+    if not isinstance(value, float) or not math.isfinite(value):
+        return _word(value)
+    if key.endswith(("_N", "_N_s")):
+        return digits(value, 3) if abs(value) < 1 else f"{value:.3f}".replace("-", "−")
+    if key.endswith("_mm"):
+        return f"{round(value, 4) + 0.0:g}".replace("-", "−") if abs(value) < 100 else _word(value)
+    return _word(value)
 
 
 def event_table(recording: Recording, marked: Sequence[tuple[int, Event]]) -> str:

@@ -165,8 +165,21 @@ _SUFFIXES = {
 }
 
 
+_PLAIN = {
+    "radius": "mm",
+    "thickness": "mm",
+    "force_delay": "s",
+    "position_delay": "s",
+    "frame_stiffness": "N/mm",
+    "moving_mass": "kg",
+}
+"""Units of figures of a bench or protocol file, whose names carry none."""
+
+
 def named(key: str, value: str) -> str:
-    """A figure whose name carries its unit, for reading: ("surface_mm", "3.217") → "surface 3.217 mm"."""
+    """A figure with its unit, which its name carries, for reading: ("surface_mm", "3.217") → "surface 3.217 mm"."""
+    if key in _PLAIN and value not in ("", "–"):
+        return f"{key.replace('_', ' ')} {value} {_PLAIN[key]}"
     for parts in (2, 1):
         words = key.rsplit("_", parts)
         unit = _SUFFIXES.get("_".join(words[1:]))

@@ -86,7 +86,7 @@ def report_page(
     body = (
         f'<h1>{markup.text(heading)}</h1>\n<p class="sub">{markup.text(_subtitle(recording, host))}</p>\n'
         + _verdicts(recording, fit, fit_problem)
-        + _diagnosed(diagnosis, diagnosis_problem)
+        + _diagnosed(diagnosis, diagnosis_problem, fit)
         + f"<nav>{links}</nav>\n"
         + "".join(section(name, content, anchor) for anchor, name, content in there)
         + "<footer>Written by padbench. Units: mm, N, s. Depth grows into the pad, force is positive in compression."
@@ -118,10 +118,25 @@ def _verdicts(recording: Recording, fit: FitView | None, problem: str) -> str:
     return body + _card(of_fit, extra)
 
 
-def _diagnosed(diagnosis: Diagnosis | None, problem: str) -> str:
+APART = (
+    "These figures and those of the fit differ a little: the fit takes positions as they were reported, the diagnosis "
+    "the motion as the pad felt it. So less of the positions' noise is in its floor and its errors."
+)
+
+
+def _diagnosed(diagnosis: Diagnosis | None, problem: str, fit: FitView | None) -> str:
     if diagnosis is not None:
-        return diagnosis_page.card(diagnosis, f"Diagnosis: {words.lowered(words.verdict(diagnosis))}", notes=False)
+        heading = f"Diagnosis: {words.lowered(words.verdict(diagnosis))}"
+        return diagnosis_page.card(diagnosis, heading, notes=False, remark=APART if _differ(diagnosis, fit) else "")
     return _card(Verdict("plain", "No diagnosis was made", [problem]), "") if problem else ""
+
+
+def _differ(diagnosis: Diagnosis, fit: FitView | None) -> bool:
+    """Whether a reader sees two figures of one name."""
+    if fit is None:
+        return False
+    pairs = ((diagnosis.noise_floor, "noise_floor"), (diagnosis.held_out_before, "held_out_rmse"))
+    return any(forces(value) != forces(fit.number(key)) for value, key in pairs if math.isfinite(fit.number(key)))
 
 
 def _card(said: Verdict, extra: str) -> str:

@@ -32,9 +32,9 @@ def trajectory(recording: Recording, plan: Plan | None, events: Sequence[tuple[i
         low, high = parts.time_span(recording)
         ax.set_xlim(low, high)
         zero = offset or 0.0
-        if plan is not None and offset is not None:
-            parts.line(ax, plan.time_s, plan.position_mm, "expected", "planned", style=":", width=1.6)
-        parts.line(ax, motor.time_s, motor.command_mm - zero, "commanded", "commanded", width=3.2)
+        if plan is not None and offset is not None:  # wide: a run that follows its plan would hide it
+            parts.line(ax, plan.time_s, plan.position_mm, "expected", "planned", width=6.4)
+        parts.line(ax, motor.time_s, motor.command_mm - zero, "commanded", "commanded", width=2.8)
         parts.line(ax, motor.time_s, motor.position_mm - zero, "measured", "measured", width=1.0)
         if surface:
             ax.axhline(0.0, color=light("noise"), lw=1.0, ls="--", zorder=1, label="pad surface")

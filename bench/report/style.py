@@ -82,7 +82,7 @@ section{background:var(--card);border:1px solid var(--edge);border-radius:10px;p
 .verdict h2{color:var(--tone);font-size:1.3rem;line-height:1.3;margin-bottom:.3rem}
 .good{--tone:var(--good)}.fair{--tone:var(--fair)}.bad{--tone:var(--bad)}.plain{--tone:var(--muted)}
 .warn{color:var(--fair)}.fail{color:var(--bad);font-weight:600}.ok{color:var(--good)}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(136px,1fr));gap:.6rem;margin:.9rem 0 .1rem}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(152px,1fr));gap:.6rem;margin:.9rem 0 .1rem}
 .tile{border:1px solid var(--edge);border-radius:8px;padding:.5rem .7rem}
 .tile b{display:block;font-size:1.14rem;line-height:1.3;font-variant-numeric:tabular-nums;overflow-wrap:anywhere}
 .tile span{color:var(--muted);font-size:.8rem;line-height:1.25;display:block}

@@ -269,3 +269,29 @@ def test_a_run_that_never_met_the_pad_is_no_data_to_fit(padbench, tmp_path):
     refused(padbench("fit", done.folder), "has no touch-off")
     report = padbench("report", done.folder)
     assert report.status == 0 and "the run ended before the pad's surface was found" in report.out
+
+
+SIZES = {
+    "force": ((1, 1, 1e300), r"scaled: holds a force of [\d.]+e\+300 N"),
+    "position": ((1, 1e200, 1), r"scaled: holds a position of 2e\+200 mm"),
+    "time": ((1e200, 1, 1), r"scaled: holds a time of 9\.98e\+200 s"),
+    "little force": ((1, 1, 1e-200), r"scaled: holds no force beyond [\d.]+e-200 N"),
+}
+
+
+@pytest.mark.parametrize(("scale", "said"), SIZES.values(), ids=SIZES)
+@pytest.mark.parametrize(
+    "command", ["fit scaled.csv --law power", "diagnose scaled.csv --model polyurethane",
+                "simulate polyurethane --like scaled.csv --out out.csv", "compare scaled.csv scaled.csv"]
+)  # fmt: skip
+@pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning", "ignore:invalid value:RuntimeWarning")
+def test_numbers_that_are_none_of_a_bench(padbench, tmp_path, command, scale, said):
+    """What the reading and the search for stray samples warn of on the way is not what this is about."""
+    t, x, f = scale
+    rows = (
+        f"{t * k / 50!r},{x * min(k / 100, 2.0)!r},{f * (min(k, 200) / 100 + 0.01 * (k * k % 7))!r}\n"
+        for k in range(500)
+    )
+    (tmp_path / "scaled.csv").write_text("time_s,position_mm,force_N\n" + "".join(rows))
+    refused(padbench(*command.split()), said, "units right")
+    assert not (tmp_path / "out.csv").exists()

@@ -11,8 +11,10 @@ import pytest
 
 from bench.cli import main
 from bench.config import load_model
+from bench.diagnose import diagnose
 from bench.like import likeness
 from bench.recording import read_recording, write_csv
+from sim.model import Model
 from tests.bench.run.benches import SHORT, run
 
 
@@ -84,3 +86,34 @@ def test_csv_is_taken_as_it_is(fitted, tmp_path, capsys):
     simulated = load_model(str(model)).simulate_at(read.position_time_s, read.position_mm, read.force_time_s)
     assert as_reported_rmse(said) == pytest.approx(float(np.sqrt(np.mean((read.force_N - simulated) ** 2))), rel=1e-4)
     assert "surface" not in said
+
+
+@pytest.mark.parametrize(
+    ("hidden", "known"),
+    [
+        ([{"id": "friction", "coulomb": 0.15}], [{"id": "friction", "coulomb": 0.1}]),
+        ([{"id": "mains_hum", "amplitude": 0.06, "frequency": 50.1}], []),
+        ([{"id": "force_bias", "bias": 0.08}], []),
+    ],
+    ids=["friction", "hum", "bias"],
+)
+def test_the_model_of_a_diagnosis_reproduces_its_error(tmp_path, hidden, known):
+    """What friction and a bias do before contact goes with the tare, and the surface is moved within its doubt."""
+    pad = load_model("polyurethane").to_dict()["pad"]
+    truth = tmp_path / "truth.yaml"
+    truth.write_text(json.dumps({"pad": pad, "effects": hidden}))
+    measured = run(tmp_path, SHORT, simulation={"pad": str(truth)}).recording.measurement()
+    assert measured.tared_s is not None and measured.surface_std_mm > 0
+    told = diagnose(measured, Model.from_dict({"pad": pad, "effects": known}))
+    assert likeness(told.model, measured).rmse_N == pytest.approx(told.rmse_after, rel=0.01)
+
+
+def test_what_a_model_says_of_the_tare_counts_as_zero(fitted):
+    """A pad with a bias in its cell answers as the one without: the tare took it away."""
+    done, _, _ = fitted
+    measured = done.recording.measurement()
+    plain = load_model("polyurethane").to_dict()
+    biased = Model.from_dict({**plain, "effects": [{"id": "force_bias", "bias": 0.5}]})
+    assert likeness(biased, measured).rmse_N == pytest.approx(likeness(Model.from_dict(plain), measured).rmse_N)
+    untared = likeness(biased, replace(measured, tared_s=None)).rmse_N
+    assert untared == pytest.approx(0.5, rel=0.1), "data without a tare have the bias in them"

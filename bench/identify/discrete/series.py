@@ -118,7 +118,8 @@ def sampled(measurements: Sequence[Measurement], T: float | None = None) -> Data
     runs = tuple(_series(m, T, checked.depth_mm, checked.force_N) for m in checked.measurements)
     left = sum(float(run.weight.sum()) for run in runs)
     if left < FEWEST:
-        raise InputError("--sample-time", f"{T:g} s leaves {left:.0f} samples to fit", f"At least {FEWEST} are needed.")
+        samples = f"{left:.0f} sample{'' if left == 1 else 's'}"
+        raise InputError("--sample-time", f"{T:g} s leaves {samples} to fit", f"At least {FEWEST} are needed.")
     notes = []
     empty = sum(int((~run.has).sum()) for run in runs)
     if empty:

@@ -74,6 +74,8 @@ def test_the_extended_model_reproduces_the_error(id):
         (("{data}",), ("--model",)),
         (("bad.csv", "--model", "polyurethane"), (r"bad\.csv",)),
         (("short.csv", "--model", "polyurethane"), (r"force samples can be used",)),
+        (("dead.csv", "--model", "polyurethane"), (r"dead: the force is zero throughout", "connected")),
+        (("stuck.csv", "--model", "polyurethane"), (r"stuck: the force is 0\.25 N throughout", "connected")),
         (("{data}", "--model", "polyurethane", "--json", "no/where.json"), (r"there is no folder no",)),
         (("{data}", "--model", "polyurethane", "--next", "no/where.yaml"), (r"there is no folder no",)),
         (("{data}", "--model", "broken.yaml"), (r"broken\.yaml",)),
@@ -82,6 +84,9 @@ def test_the_extended_model_reproduces_the_error(id):
 def test_bad_input_is_said_in_one_message(padbench, csv, words, patterns):
     Path("bad.csv").write_text("a,b\n1,2\n")
     Path("short.csv").write_text("time_s,position_mm,force_N\n" + "".join(f"{k / 10},{k},{k}\n" for k in range(5)))
+    for name, level in (("dead", 0.0), ("stuck", 0.25)):
+        rows = (f"{k / 50},{min(k / 100, 2.0)},{level}\n" for k in range(500))
+        Path(f"{name}.csv").write_text("time_s,position_mm,force_N\n" + "".join(rows))
     Path("broken.yaml").write_text("pad: {elastic: {law: exponential, m: -1, b: 2}}\n")
     said = padbench("diagnose", *(csv if word == "{data}" else word for word in words))
     assert said.status == 2, said

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.diagnose.result import Remainder
 from bench.report.diagnosis import diagnosis_page, write_diagnosis
 from bench.report.diagnosis_views import best_view
 from tests.bench.diagnose.small import made_up
@@ -87,3 +88,17 @@ def test_a_hum_stands_at_its_frequency():
     assert series.x[peak] == pytest.approx(21.0, abs=0.06)
     assert series.before_N[peak] == pytest.approx(0.05, rel=0.2)  # a Hann window's peak, between two bins at worst
     assert series.after_N.max() < 1e-6
+
+
+def test_where_no_cause_is_named_nothing_is_shown_twice():
+    named, plain = (check(diagnosis_page(d)) for d in (made_up(), made_up(verdict="consistent", causes=[], flags={})))
+    assert "after: with the causes named" in named.words and "before: as believed, refitted" in named.words
+    for words in ("after: with the causes named", "before: as believed, refitted", "after", "before"):
+        assert words not in plain.words, words
+    assert "as believed, refitted" in plain.words and "with the causes named" not in plain.shown
+
+
+@pytest.mark.parametrize(("p_value", "said"), [(0.0, "< 0.0001"), (1e-300, "< 0.0001"), (0.003, "0.003"), (0.4, "0.4")])
+def test_the_chance_of_a_finding_is_never_said_to_be_none(p_value, said):
+    told = Remainder("speed", p_value, 0.03, "goes with the speed", True)
+    assert f'<td class="n">{said.replace("<", "&lt;")}</td>' in diagnosis_page(made_up(remainders=[told]))

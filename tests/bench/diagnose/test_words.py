@@ -95,3 +95,22 @@ def test_numbers_that_were_not_fitted_are_left_out():
     said = "\n".join(lines(d))
     assert ("presliding" in said) == ("presliding" not in fixed)
     assert PAD["elastic"]["law"] == "exponential"
+
+
+def test_several_causes_take_and_one_takes():
+    friction = made_up().causes[0]
+    both = [friction, replace(friction, id="sensor_lag")]
+    assert "friction takes 40 %" in headline(made_up(verdict="unexplained", left=0.6))
+    assert "friction and a lagging force sensor take 40 %" in headline(
+        made_up(verdict="unexplained", left=0.6, causes=both)
+    )
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(0.0, "under 1 %"), (1.4e-13, "under 1 %"), (0.012, "1.2 %"), (0.3, "30 %")]
+)
+def test_a_rival_that_reaches_next_to_nothing(share, said):
+    friction = made_up().causes[0]
+    rival = replace(friction.alternatives[0], id="elastic_law", gain_share=share)
+    found = "\n".join(lines(made_up(causes=[replace(friction, alternatives=[rival])])))
+    assert f"cannot exclude: another elastic law ({said} of the gain)" in found

@@ -103,10 +103,17 @@ def test_surface_elsewhere() -> None:
     assert "The force rises only from" in notes(replace(data, position_mm=data.position_mm + 5.0))
 
 
+def in_pad_s(m: Measurement) -> float:
+    """When the probe first passes the surface."""
+    return float(m.position_time_s[np.argmax(m.position_mm > 0)])
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         (lambda m: replace(m, position_mm=-m.position_mm - 1), "never passes the surface"),
+        (lambda m: replace(m, fit_to_s=0.9 * in_pad_s(m)), "never in the pad where the force counts"),
+        (lambda m: replace(m, surface_std_mm=float(m.position_mm.max()) / 2.9), "never in the pad"),
         (lambda m: replace(m, force_N=0 * m.force_N), "force is zero throughout"),
         (lambda m: replace(m, force_time_s=m.force_time_s[:9], force_N=m.force_N[:9]), "only 9 force samples"),
         (lambda m: replace(m, fit_from_s=1e9), "only 0 force samples"),

@@ -157,3 +157,10 @@ def test_a_mode_more_must_be_a_clear_gain():
     assert _pick([(0.0, large), (2 * CLEAR, small)]) is large  # type: ignore[list-item]
     assert _pick([(0.0, twin), (50.0, large)]) is large  # type: ignore[list-item]
     assert _pick([(0.0, twin)]) is twin  # type: ignore[list-item]
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.7, "leaves 2 samples to fit"), (1.2, "leaves 1 sample to fit")])
+def test_a_sample_time_that_leaves_next_to_nothing(share, said):
+    data = of_path(Path(-0.3).hold(0.5).to(2.0, 80).hold(3))
+    with pytest.raises(InputError, match=said):
+        sampled([data], share * float(np.ptp(data.force_time_s)))

@@ -42,10 +42,15 @@ def test_agreement_is_the_chi_square_test() -> None:
     def entries(*values: float) -> list[tuple[int, float, float, str, bool]]:
         return [(i, value, 1.0, "N", False) for i, value in enumerate(values)]
 
-    # two values with std 1: χ² = d²/2 on one degree of freedom; its 1 % point is 6.635, so d = 3.643
-    assert agreement(entries(0.0, 3.60)).startswith("yes")
+    # two values with std 1: χ² = d²/2 on one degree of freedom; its 5 % point is 3.841, so d = 2.772
+    assert agreement(entries(0.0, 2.75)).startswith("yes")
+    assert agreement(entries(0.0, 2.79)).startswith("perhaps: equal ones scatter so far in 4.9 % of cases")
+    # its 1 % point is 6.635, so d = 3.643
+    assert agreement(entries(0.0, 3.60)).startswith("perhaps")
     assert agreement(entries(0.0, 3.68)).startswith("no")
     assert agreement(entries(0.0)) == ""
+    # a surer value's own bar is hidden by its mark: 2.2 deviations of the other apart, beyond its 95 % bar
+    assert agreement([(0, 0.149951, 0.000091, "1", False), (1, 0.1686, 0.0085, "1", False)]).startswith("perhaps")
     undetermined = [(0, 0.0, 1.0, "N", False), (1, 50.0, 1.0, "N", True)]
     assert agreement(undetermined) == ""
 

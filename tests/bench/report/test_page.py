@@ -1,15 +1,17 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bench.recording.types import Event, ForceChannel, MotorChannel, Recording, StepMark
-from bench.report import Evidence, Plan, write_report
+from bench.report import Evidence, Plan, plots, write_report
 from bench.report.page import report_page
 from bench.report.plots import fastest_ramp
+from tests.bench.diagnose.small import made_up
 
 from . import samples
 from .html_check import check
@@ -261,6 +263,7 @@ def test_an_air_run_speaks_of_no_surface(run: Recording) -> None:
     seen = check(report_page(air, None, fit_problem="there was no pad (air run)"))
     assert "No surface was looked for" in seen.shown
     assert "motor position, mm" in seen.words and "depth, mm" not in seen.words and "pad surface" not in seen.words
+    assert "Force against indentation" not in seen.shown
 
 
 def test_structures_are_ranked_and_the_far_ones_folded(run: Recording) -> None:
@@ -269,3 +272,35 @@ def test_structures_are_ranked_and_the_far_ones_folded(run: Recording) -> None:
     shown = words[words.index("Structures tried law order") : words.index("21 further structures")]
     assert "law29 3 29.1" in shown and "chosen" in shown and "law15" not in shown
     assert shown.index("law29") < shown.index("law28") < shown.index("law0")
+
+
+def test_figures_have_units_and_no_more_digits_than_a_bench_tells(run: Recording) -> None:
+    events = [
+        Event(0.1, "tare", {"tare_N": -0.000686703, "drift_N_s": 0.00079252}),
+        Event(0.2, "contact", {"position_mm": 1.545612345, "net_N": 12.345678, "threshold_N": 0.0535333}),
+    ]
+    about = {"probe": '{"id": "s5", "shape": "sphere", "radius": 5}', "timing": '{"force_delay": 0.0}'}
+    shown = check(report_page(dataclasses.replace(run, events=events, run={**run.run, **about}), None)).shown
+    for said in ("radius 5 mm", "force delay 0 s", "tare −0.000687 N", "drift 0.000793 N/s", "position 1.5456 mm",
+                 "net 12.346 N", "threshold 0.0535 N"):  # fmt: skip
+        assert said in shown, said
+
+
+def test_the_plan_shows_beside_a_run_that_follows_it(run: Recording) -> None:
+    """A line under another of its width would be in the legend alone."""
+    at, motor, zero = np.isfinite(run.motor.command_mm), run.motor, run.surface_mm or 0.0
+    page = plots.trajectory(run, Plan(motor.time_s[at], motor.command_mm[at] - zero), [])
+    drawn = re.findall(r"clip-path[^>]*stroke: var\(--(\w+)\); stroke-width: ([\d.]+)", page)
+    width = {name: float(points) for name, points in drawn}
+    assert width["expected"] > 2 * width["commanded"]
+
+
+def test_fit_and_diagnosis_with_other_figures_say_why(run: Recording) -> None:
+    fit, told = samples.fit(run), made_up(noise_floor=0.0101, held_out_before=0.0102)
+    same = dataclasses.replace(fit, json={**fit.json, "noise_floor": 0.01012, "held_out_rmse": 0.0102})
+    other = dataclasses.replace(fit, json={**fit.json, "noise_floor": 0.0105, "held_out_rmse": 0.0102})
+    said = [
+        "motion as the pad felt it" in check(report_page(run, view, diagnosis=told)).shown
+        for view in (same, other, None)
+    ]
+    assert said == [False, True, False]
