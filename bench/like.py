@@ -8,7 +8,8 @@ Reported positions are noisy, and coarse in fast moves. A diagnosis runs its mod
 serves the model clearly better.
 
 What a run took for zero (its tare) counts as zero of the model too, as in a diagnosis: friction or a bias that the load
-cell felt before contact is not in its net force. The tare's own error is found again within its doubt, as the surface is.
+cell felt before contact is not in its net force. The tare's own error is found again within its doubt, as the surface
+is.
 """
 
 from __future__ import annotations

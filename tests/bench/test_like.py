@@ -46,7 +46,8 @@ def test_simulate_agrees_with_the_fit(fitted, tmp_path, capsys):
     capsys.readouterr()
     assert main(["simulate", str(model), "--like", str(done.folder), "--out", str(tmp_path / "out.csv")]) == 0
     said = capsys.readouterr().out
-    assert as_reported_rmse(said) == pytest.approx(fit["rmse"], rel=2e-3)
+    # a fit takes the tare for right; here its own error, of some hundredths of the noise's power, is found
+    assert 0.98 * fit["rmse"] < as_reported_rmse(said) < 1.002 * fit["rmse"]
     assert said_rmse(said) <= as_reported_rmse(said)
     assert "surface taken" in said
 
