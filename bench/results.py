@@ -14,6 +14,7 @@ import numpy as np
 from bench import identify
 from bench.diagnose import diagnose
 from bench.diagnose.next_test import bench_in, design
+from bench.diagnose.words import force
 from bench.diagnose.words import lines as diagnosis_lines
 from bench.errors import InputError, PadbenchError
 from bench.fitview import fit_view
@@ -102,10 +103,10 @@ def analyse(
 def fit_lines(fit: FitResult) -> list[str]:
     """The fit in a few lines: structure, error beside noise, parameters with standard errors."""
     size = f" of degree {fit.degree}" if fit.degree else ""
-    held = f", {1e3 * fit.held_out_rmse:.3g} mN on data held out" if math.isfinite(fit.held_out_rmse) else ""
+    held = f", {force(fit.held_out_rmse)} on data held out" if math.isfinite(fit.held_out_rmse) else ""
     lines = [
         f"fit: {fit.law} law{size}, {fit.order} relaxation mode{'s' if fit.order > 1 else ''}, {fit.contact} contact",
-        f"  error {1e3 * fit.rmse:.3g} mN (noise of the data {1e3 * fit.noise_floor:.3g} mN){held}; "
+        f"  error {force(fit.rmse)} (noise of the data {force(fit.noise_floor)}){held}; "
         f"{fit.fit_percent:.2f} % of the force explained",
     ]
     width = max(len(name) for name in fit.parameters)

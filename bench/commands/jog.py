@@ -29,7 +29,12 @@ def main(args: argparse.Namespace) -> int:
     from bench.daily.hand import MOST_SPEED_MM_S, MOST_STEP_MM
 
     if args.by is not None and args.by != 0:
-        positive("--by", abs(args.by), MOST_STEP_MM, "mm", "jog in several steps, and look in between")
+        if not abs(args.by) <= MOST_STEP_MM:
+            raise InputError(
+                "--by",
+                f"{args.by:g} mm is a step of over {MOST_STEP_MM:g} mm",
+                "jog in several steps, and look in between",
+            )
     elif args.by == 0:
         raise InputError("--by", "0 mm is no step", "give millimetres, negative away from the pad")
     positive("--speed", args.speed, MOST_SPEED_MM_S, "mm/s", "what is faster is a protocol's business")

@@ -39,7 +39,7 @@ def add_structure(parser: argparse.ArgumentParser) -> None:
         help="continuous (default): simulation error, continuous time; the paper's noniterative, iterative, fast; "
         "iv (iterative, unbiased); recursive (as while the run goes on)",
     )
-    parser.add_argument("--law", default="auto", help="exponential, power, polynomial or auto (default)")
+    parser.add_argument("--law", default="auto", help="exponential, power, polynomial, spline or auto (default)")
     parser.add_argument("--order", default="auto", help="relaxation modes: 1 to 4 or more, or auto (default)")
     parser.add_argument("--degree", type=int, metavar="N", help="degree of a polynomial law")
     parser.add_argument(

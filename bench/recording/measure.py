@@ -37,8 +37,6 @@ SPIKE = 30.0
 SPIKE_OVER_STEPS = 5.0
 """… and so many times further than the neighbours moved themselves (the tip of a triangle is none)."""
 
-MERGED_TIMES = "samples with a stamp that was there already were averaged"
-
 
 @dataclass(frozen=True)
 class Delays:
@@ -153,10 +151,13 @@ def _channel(what: str, time_s: Array, values: Array, notes: list[str]) -> tuple
     time_s, values = time_s[good], values[good]
     back = int(np.count_nonzero(np.diff(time_s) < 0))
     if back:
-        notes.append(f"{what}: {back} stamps lie before the one that came first; put in order")
+        lie = "stamps lie" if back > 1 else "stamp lies"
+        notes.append(f"{what}: {back} {lie} before the one that came first; put in order")
     stamps, merged = increasing(time_s, values)
     if stamps.size < time_s.size:
-        notes.append(f"{what}: {time_s.size - stamps.size} {MERGED_TIMES}")
+        again = time_s.size - stamps.size
+        several = ("samples", "were") if again > 1 else ("sample", "was")
+        notes.append(f"{what}: {again} {several[0]} with a stamp that was there already {several[1]} averaged")
     return stamps, merged
 
 
@@ -222,7 +223,7 @@ def _report_spikes(what: str, time_s: Array, values: Array, notes: list[str]) ->
     if values.size < 8:
         return
     up, down = values[1:-1] - values[:-2], values[1:-1] - values[2:]
-    away = np.where(up * down > 0, np.minimum(np.abs(up), np.abs(down)), 0.0)
+    away = np.where(np.sign(up) == np.sign(down), np.minimum(np.abs(up), np.abs(down)), 0.0)
     bend = np.abs(up + down) / 2
     noise = 1.4826 * float(np.median(bend[bend > 0])) if np.any(bend) else 0.0  # a channel may stand still
     steps = np.abs(np.diff(values))

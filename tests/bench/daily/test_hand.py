@@ -94,7 +94,9 @@ def test_a_cell_that_falls_silent_stops_a_jog(monkeypatch):
 
 BAD = {
     "no step": (["--by", "0"], "--by: 0 mm is no step"),
-    "too far": (["--by", "9"], r"--by: 9 mm is not over 0 and up to 5 mm"),
+    "too far": (["--by", "9"], r"--by: 9 mm is a step of over 5 mm"),
+    "too far away": (["--by", "-5.1"], r"--by: -5.1 mm is a step of over 5 mm"),
+    "nowhere": (["--by", "nan"], r"--by: nan mm is a step of over 5 mm"),
     "no number": (["--by", "nan"], "--by: nan mm"),
     "a word": (["--by", "much"], "'much' is no number"),
     "too fast": (["--by", "1", "--speed", "50"], "--speed: 50 mm/s"),

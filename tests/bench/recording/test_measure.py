@@ -61,8 +61,8 @@ def test_equal_stamps_are_averaged_and_disorder_is_put_right():
     assert m.position_time_s.tolist() == [0, 1, 2, 3, 4] and m.position_mm.tolist() == [0, 15, 30, 40, 50]
     assert m.force_time_s.tolist() == [0, 1, 2, 3] and m.force_N.tolist() == [1, 2, 4, 6]
     said = "; ".join(m.notes)
-    assert "position: 1 stamps lie before" in said and "position: 1 samples with a stamp" in said
-    assert "force: 1 samples with a stamp" in said
+    assert "position: 1 stamp lies before" in said and "position: 1 sample with a stamp" in said
+    assert "force: 1 sample with a stamp" in said
 
 
 def test_samples_that_are_missing_are_left_out_and_gaps_are_told():
