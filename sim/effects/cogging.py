@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC
 from sim.jit import State, block
 
 
@@ -45,10 +46,6 @@ def trailing(dt: float, y: float, state: State, p: State) -> float:
         state[1] = y
     state[1] = min(max(state[1], y - 0.5 * p[3]), y + 0.5 * p[3])
     return p[0] * math.sin(2.0 * math.pi * state[1] / p[1] + p[2])
-
-
-def _phase(name: str, what: str) -> Parameter:
-    return Parameter(name, "rad", -10.0, 10.0, 0.0, what, starts=(0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi))
 
 
 _AMPLITUDE = Parameter(
@@ -83,31 +80,19 @@ EFFECT = Effect(
         Form(
             name="sine",
             what="one sine",
-            parameters=(_AMPLITUDE, _PERIOD, _phase("phase", "phase at position 0")),
+            parameters=(_AMPLITUDE, _PERIOD, PHASE),
             blocks={"probe": sine},
         ),
         Form(
             name="harmonics",
             what="a sine and its second harmonic",
-            parameters=(
-                _AMPLITUDE,
-                _PERIOD,
-                _phase("phase", "phase at position 0"),
-                Parameter("ratio", "1", 0.0, 3.0, 0.5, "second harmonic over the first"),
-                _phase("second_phase", "phase of the second harmonic at position 0"),
-            ),
+            parameters=(_AMPLITUDE, _PERIOD, PHASE, *SECOND_HARMONIC),
             blocks={"probe": harmonics},
         ),
         Form(
             name="swelling",
             what="a sine that grows along the way",
-            parameters=(
-                _AMPLITUDE,
-                _PERIOD,
-                _phase("phase", "phase at position 0"),
-                Parameter("growth", "1/mm", -5.0, 5.0, 0.0, "relative growth per mm", starts=(-0.2, 0.2)),
-                Parameter("at_depth", "mm", 1e-3, 100.0, 1.0, "depth at which the amplitude holds", fixed=True),
-            ),
+            parameters=(_AMPLITUDE, _PERIOD, PHASE, *GROWTH),
             blocks={"probe": swelling},
         ),
         Form(
@@ -116,7 +101,7 @@ EFFECT = Effect(
             parameters=(
                 _AMPLITUDE,
                 _PERIOD,
-                _phase("phase", "phase at position 0"),
+                PHASE,
                 Parameter("trail", "mm", 0.0, 5.0, 0.1, "full width of the play between the two ways"),
             ),
             blocks={"probe": trailing},

@@ -16,6 +16,7 @@ import math
 from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC
 from sim.jit import State, block
 
 _STEEPEST = 0.9
@@ -55,10 +56,6 @@ def _packed(values: Mapping[str, float]) -> tuple[float, ...]:
     return (amplitude, wave_number, values["phase"], ratio, values.get("second_phase", 0.0))
 
 
-def _phase(name: str, what: str) -> Parameter:
-    return Parameter(name, "rad", -10.0, 10.0, 0.0, what, starts=(0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi))
-
-
 _AMPLITUDE = Parameter(
     "amplitude",
     "mm",
@@ -91,33 +88,21 @@ EFFECT = Effect(
         Form(
             name="sine",
             what="one sine",
-            parameters=(_AMPLITUDE, _PERIOD, _phase("phase", "phase at position 0")),
+            parameters=(_AMPLITUDE, _PERIOD, PHASE),
             blocks={"report": sine},
             pack=_packed,
         ),
         Form(
             name="harmonics",
             what="a sine and its second harmonic",
-            parameters=(
-                _AMPLITUDE,
-                _PERIOD,
-                _phase("phase", "phase at position 0"),
-                Parameter("ratio", "1", 0.0, 3.0, 0.5, "second harmonic over the first"),
-                _phase("second_phase", "phase of the second harmonic at position 0"),
-            ),
+            parameters=(_AMPLITUDE, _PERIOD, PHASE, *SECOND_HARMONIC),
             blocks={"report": harmonics},
             pack=_packed,
         ),
         Form(
             name="fading",
             what="a sine that fades or grows along the way",
-            parameters=(
-                _AMPLITUDE,
-                _PERIOD,
-                _phase("phase", "phase at position 0"),
-                Parameter("growth", "1/mm", -5.0, 5.0, 0.0, "relative growth per mm", starts=(-0.2, 0.2)),
-                Parameter("at_depth", "mm", 1e-3, 100.0, 1.0, "depth at which the amplitude holds", fixed=True),
-            ),
+            parameters=(_AMPLITUDE, _PERIOD, PHASE, *GROWTH),
             blocks={"report": fading},
             pack=_packed_fading,
         ),

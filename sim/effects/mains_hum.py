@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.waves import phase
 from sim.jit import State, block
 
 
@@ -26,10 +27,6 @@ def harmonics(dt: float, force: float, state: State, p: State) -> float:
     state[0] += dt
     angle = 2.0 * math.pi * p[1] * state[0]
     return force + p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(3.0 * angle + p[4]))
-
-
-def _phase(name: str, what: str) -> Parameter:
-    return Parameter(name, "rad", -10.0, 10.0, 0.0, what, starts=(0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi))
 
 
 _AMPLITUDE = Parameter(
@@ -57,7 +54,7 @@ EFFECT = Effect(
         Form(
             name="sine",
             what="one sine",
-            parameters=(_AMPLITUDE, _FREQUENCY, _phase("phase", "phase at the first sample")),
+            parameters=(_AMPLITUDE, _FREQUENCY, phase("phase", "phase at the first sample")),
             blocks={"sensor": sine},
             state=(0.0,),
         ),
@@ -67,9 +64,9 @@ EFFECT = Effect(
             parameters=(
                 _AMPLITUDE,
                 _FREQUENCY,
-                _phase("phase", "phase at the first sample"),
+                phase("phase", "phase at the first sample"),
                 Parameter("ratio", "1", 0.0, 3.0, 0.3, "third harmonic over the first"),
-                _phase("third_phase", "phase of the third harmonic at the first sample"),
+                phase("third_phase", "phase of the third harmonic at the first sample"),
             ),
             blocks={"sensor": harmonics},
             state=(0.0,),
