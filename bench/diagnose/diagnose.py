@@ -107,11 +107,13 @@ def _needless(
 
 
 def _doubtful(path: Path, fits: list[Fit], excess: list[float], apart: float) -> int | None:
-    """Number of a further cause that takes little and whose name is hardly sure: what else may leave that."""
-    own = len(fits[0].structure.causes)
+    """Number of a further cause whose name is hardly sure, and that takes little, and less than is left: what left the
+    one may have left the other."""
+    named = [c.id for c in fits[-1].structure.causes[len(fits[0].structure.causes) :]]
     for k in range(len(fits) - 1, 1, -1):
-        _, confidence, kind = sureness(path, fits[-1].structure.causes[own + k - 1].id)
-        if max(confidence, kind) < DOUBTED and excess[k - 1] - excess[k] < LITTLE * (excess[0] + apart):
+        _, confidence, kind = sureness(path, named[k - 1], named)
+        taken = excess[k - 1] - excess[k]
+        if max(confidence, kind) < DOUBTED and taken < min(LITTLE * (excess[0] + apart), excess[-1]):
             return k - 1
     return None
 

@@ -7,15 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from sim.effects.base import Parameter
+
 from .data import Prepared
 from .refit import Fit
 
 LEVEL = 0.01  # of a false alarm over all that is tried
 TRIED = 150.0  # candidates with their starts, as independent tries
 CRUMB = 0.002  # of the noise power: what is smaller is no finding
-LONGEST = 0.99  # of the longest period that is sought
+EDGE = 1.01  # times a bound, within which a number is at it
 BEYOND = 3.0  # standard deviations of touch-off and tare, within which neither is found wrong
-MOST_LEFT, SPEAKS = 0.6, 0.02  # of what is left, and of the noise power: a cause beside a far larger one takes so much
+MOST_LEFT, SPEAKS = 0.6, 0.01  # of what is left, and of the noise power: a cause beside a far larger one takes so much
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 
 
@@ -91,6 +93,13 @@ def tempered(effective: float, share: float, ratio: float) -> float:
     return min(effective, 1.5 + 250.0 * (1.0 - share), 6.0 * float(np.log1p(max(ratio, 0.0))))
 
 
+def _inside(p: Parameter, value: float) -> bool:
+    """Whether a number is clear of the bounds of what is sought."""
+    if p.logarithmic:
+        return EDGE * p.lower < value < p.upper / EDGE
+    return p.lower < value < p.upper / EDGE
+
+
 def believable(fit: Fit, prepared: Prepared) -> bool:
     """Whether the last cause's numbers are beyond what such data could show at all."""
     cause = fit.structure.causes[-1]
@@ -106,8 +115,9 @@ def believable(fit: Fit, prepared: Prepared) -> bool:
         if abs(values[name]) < BEYOND * std:
             return False
     for p in cause.form.parameters:
-        if p.name == "period" and values[p.name] > LONGEST * p.upper:
-            return False  # of a longer wave the data hold too little: it is anything that bends
+        told = cause.amplitude is not None and p.required and not (p.fixed or p.amplitude)
+        if told and not _inside(p, values[p.name]):
+            return False  # at its bound it is another cause's limit: a wave longer than the data, a pull of any reach
         if p.floor is not None and abs(values[p.name]) < p.floor[1] * limits[p.floor[0]]:
             return False
     return True

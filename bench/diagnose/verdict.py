@@ -91,9 +91,12 @@ def stage_of(path: Path, id_: str) -> tuple[Trial, list[Trial], float, Measure] 
 
 
 def alternatives(
-    measure: Measure, fit: Fit, without_chi2: float, rivals: Sequence[Trial]
+    measure: Measure, fit: Fit, without_chi2: float, rivals: Sequence[Trial], named: Sequence[str] = ()
 ) -> tuple[list[Alternative], float, float]:
-    """(those that the data cannot exclude, and the strongest rival; confidence in the name, and in its kind)."""
+    """(those that the data cannot exclude, and the strongest rival; confidence in the name, and in its kind).
+
+    `named`: causes that were found too, and do not make each other doubtful.
+    """
     best = fit.chi2
     # what the family's shape leaves counts as noise when names are compared: no shape is exact
     scale = max(best / max(measure.expected, 1.0), 1.0) * np.sqrt(measure.memory)
@@ -108,6 +111,8 @@ def alternatives(
         share = float(np.clip((without_chi2 - t.fit.chi2) / gained, 0.0, 1.0))
         excluded = bool(effective > RIVAL and share < 0.995)
         ratio = float(delta) / (unexplained(best, measure.expected) + 1.0)
+        if t.id in named:
+            continue
         likely = float(np.exp(-0.5 * min(max(tempered(effective, share, ratio), 0.0), 200.0)))
         odds += likely
         of_others += 0.0 if late and t.id in LATE else likely
@@ -116,13 +121,13 @@ def alternatives(
     return out, 1.0 / (1.0 + odds), 1.0 / (1.0 + of_others)
 
 
-def sureness(path: Path, id_: str) -> tuple[list[Alternative], float, float]:
-    """`alternatives` of a cause that a search has found."""
+def sureness(path: Path, id_: str, named: Sequence[str]) -> tuple[list[Alternative], float, float]:
+    """`alternatives` of a cause that a search has found; `named`: all that were."""
     stage = stage_of(path, id_)
     if stage is None:
         return [], 0.5, 0.5
     trial, rivals, before, measure = stage
-    return alternatives(measure, trial.fit, before, rivals)
+    return alternatives(measure, trial.fit, before, rivals, named)
 
 
 def described(fit: Fit, index: int) -> tuple[str, str, dict[str, Number]]:
@@ -149,9 +154,10 @@ def described(fit: Fit, index: int) -> tuple[str, str, dict[str, Number]]:
 def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> list[CauseFound]:
     """The causes as the result has them. `final`: polished on all the data."""
     own = len(search.believed.causes)
+    named = [c.id for c in final.structure.causes[own : own + len(gains)]]
     out = []
     for k, gain in enumerate(gains):
-        others, confidence, kind = sureness(path, final.structure.causes[own + k].id)
+        others, confidence, kind = sureness(path, named[k], named)
         id_, form, numbers = described(final, own + k)
         effect = final.structure.causes[own + k].effect
         values = {name: number.value for name, number in numbers.items()}
