@@ -146,7 +146,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"padbench {args.command}: stopped by the operator (Ctrl-C)", file=sys.stderr)
         return EXIT_NO
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _give_up_output()
         return EXIT_NO
     except OSError as error:
         if error.filename is None and error.errno in NO_ROOM:
@@ -163,10 +163,15 @@ def _module(name: str) -> Any:
     return importlib.import_module(f"bench.commands.{name}")
 
 
+def _give_up_output() -> None:
+    """What standard output still holds goes nowhere, without a word at the interpreter's end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _no_room(command: str, error: OSError) -> int:
-    """A stream of ours (standard output) goes where nothing can be written: what it still holds is given up."""
+    """Standard output goes where nothing can be written."""
     with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _give_up_output()
     print(f"padbench {command}: what it says cannot be written: {error.strerror}", file=sys.stderr)
     return EXIT_BAD_INPUT
 

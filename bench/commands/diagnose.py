@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.commands.options import add_columns, read_data, status
-from bench.commands.outputs import add_output
+from bench.commands.outputs import add_json, add_output
 from bench.errors import EXIT_DONE, InputError
 
 if TYPE_CHECKING:
@@ -22,14 +22,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("data", type=Path, metavar="DATA", help="MCAP, run folder or CSV")
     parser.add_argument("--model", required=True, metavar="MODEL", help="the model believed: file or shipped name")
     add_columns(parser)
-    add_output(
-        parser,
-        "--json",
-        kinds=("json",),
-        stdout=True,
-        metavar="OUT",
-        help="write diagnosis.json there; - for standard output alone",
-    )
+    add_json(parser, "write diagnosis.json there; - for standard output alone")
     add_output(parser, "--write", kinds=("yaml",), type=Path, metavar="MODEL2", help="write the extended model as YAML")
     add_output(
         parser,

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from bench.commands.options import add_columns, add_structure, pads, read_data, status
-from bench.commands.outputs import add_output
+from bench.commands.outputs import add_json, add_output
 from bench.errors import EXIT_DONE
 
 
@@ -25,14 +25,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ramps", choices=["recovered", "all"], help="fast: the rising ramps that show the elastic law"
     )
-    add_output(
-        parser,
-        "--json",
-        kinds=("json",),
-        stdout=True,
-        metavar="OUT",
-        help="write fit.json there; - for standard output, and nothing else",
-    )
+    add_json(parser, "write fit.json there; - for standard output, and nothing else")
     add_output(parser, "--write", kinds=("yaml",), type=Path, metavar="MODEL", help="write the fitted model as YAML")
     add_output(
         parser, "--report", kinds=("html",), type=Path, metavar="HTML", help="write a report page of the first DATA"

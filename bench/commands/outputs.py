@@ -53,6 +53,11 @@ def add_output(
     parser.set_defaults(outputs={**known, action.dest: Output(name, kinds, stdout, edits)})
 
 
+def add_json(parser: argparse._ActionsContainer, help: str) -> None:
+    """`--json OUT`, which may be standard output."""
+    add_output(parser, "--json", kinds=("json",), stdout=True, metavar="OUT", help=help)
+
+
 def check_outputs(args: argparse.Namespace) -> None:
     """Whether the files to write may be written: said before the work whose results are to go there.
 

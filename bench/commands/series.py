@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bench.commands.options import say, status
-from bench.commands.outputs import add_output
+from bench.commands.outputs import add_json
 from bench.commands.progress import Progress
 from bench.daily.words import asked, put_out
 from bench.errors import EXIT_DONE, EXIT_NO, InputError, PadbenchError, Refused
@@ -25,14 +25,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--yes", action="store_true", help="ask nothing: measure all that is left")
     parser.add_argument("--redo", action="append", default=[], metavar="ID", help="measure this pad again")
     parser.add_argument("--changed", action="store_true", help="go on although bench or protocol have changed")
-    add_output(
-        parser,
-        "--json",
-        kinds=("json",),
-        stdout=True,
-        metavar="OUT",
-        help="write the table there; - for standard output alone",
-    )
+    add_json(parser, "write the table there; - for standard output alone")
 
 
 def main(args: argparse.Namespace) -> int:

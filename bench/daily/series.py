@@ -7,7 +7,6 @@ half of a protocol is no measurement.
 from __future__ import annotations
 
 import datetime
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -21,7 +20,7 @@ from bench.daily.series_state import PadState, State, Turn
 from bench.errors import InputError, Refused
 from bench.preflight import Preflight
 from bench.protocol import Protocol
-from bench.recording.lock import hold
+from bench.recording.lock import holding
 from bench.recording.unfinished import left_behind, must_be_idle, notice
 from bench.run.folder import REPORT, discard
 from bench.run.runner import Notes, Outcome, run_protocol
@@ -67,17 +66,10 @@ def held(out: Path) -> Iterator[None]:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(str(out), f"cannot be made: {error.strerror}", "name another `out` in the list") from None
-    try:
-        descriptor = os.open(out, os.O_RDONLY)
-    except OSError:  # a system that opens no folder
-        yield
-        return
-    try:
-        if not hold(descriptor):
+    with holding(out) as ours:
+        if not ours:
             raise Refused(f"{out}: another series is being measured into it\n  wait for its end, or leave it there")
         yield
-    finally:
-        os.close(descriptor)
 
 
 def measure(series: Series, preflight: Preflight, state: State, person: Person, redo: tuple[str, ...] = ()) -> bool:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bench.commands.options import say
-from bench.commands.outputs import add_output
+from bench.commands.outputs import add_json
 from bench.errors import InputError, Refused
 
 if TYPE_CHECKING:
@@ -28,14 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, moves: bool, figures: bool
     if moves:
         parser.add_argument("--attended", action="store_true", help="somebody stands at the bench, a hand at its stop")
     if figures:
-        add_output(
-            parser,
-            "--json",
-            kinds=("json",),
-            stdout=True,
-            metavar="OUT",
-            help="write every figure there; - for standard output alone",
-        )
+        add_json(parser, "write every figure there; - for standard output alone")
 
 
 def bench_of(args: argparse.Namespace) -> Bench:

@@ -51,8 +51,6 @@ class Data:
     colour: Colour = Colour()
     """Of the noise, from force sample to force sample, which are `sample_s` apart, as far as the cost knows of it."""
     sample_s: float = 1.0
-    short: Data | None = None
-    """The stand-in for it, free of hum."""
 
     @property
     def size(self) -> int:
@@ -150,8 +148,8 @@ class Prepared:
         """With a cost that knows the noise's colour. It is for fits that leave little beside the noise: it makes much
         of what changes fast, and so of what a model that is far off leaves there.
         """
-        short = replace(self.short, colour=self.colour)
-        return replace(self, full=replace(self.full, colour=self.colour, short=short), short=short)
+        colour = self.colour
+        return replace(self, full=replace(self.full, colour=colour), short=replace(self.short, colour=colour))
 
     @property
     def floor_N(self) -> float:
@@ -225,11 +223,10 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     owner = _blocks(
         full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(motion.std_mm, 0.9))
     )
-    short = _averaged(full, owner)
     return Prepared(
         name=m.name,
-        full=replace(full, short=short),
-        short=short,
+        full=full,
+        short=_averaged(full, owner),
         owner=owner,
         at=where,
         kept=inside,

@@ -66,7 +66,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     prepared = search.prepared
     prepared, flags, search, path = _asked_again(m, prepared, flags, search, path)
     base, final = path.fits[0], path.fits[-1]
-    final = ordered(prepared, reshaped(prepared.full, final, len(base.structure.causes)), base)
+    final = ordered(prepared, reshaped(prepared.short, final, len(base.structure.causes)), base)
     tell("predicting what was held out")
     fits = chain(prepared, final, base)
     floor = _floor(prepared, final)
@@ -138,15 +138,15 @@ def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fi
     before = onto(fits[0], prepared.full, 6, 1e-8)
     last = replace(fits[-1], x=missing_told(fits[-1], believed))
     if prepared.hum is None or not prepared.hum.of_the_mains:
-        return before, _spread(prepared.full, onto(last, prepared.full, 6, 1e-8))
+        return before, _spread(prepared, prepared.full, onto(last, prepared.full, 6, 1e-8))
     cause = hum_cause(prepared.hum)
     structure = last.structure.with_cause(cause)
     own = structure.x(last.x[: len(structure.pad.coordinates)], None)[structure.of_cause(len(structure.causes) - 1)]
-    return before, _spread(raw, refit(raw, structure, extended(last, own), 8, 1e-8))
+    return before, _spread(prepared, raw, refit(raw, structure, extended(last, own), 8, 1e-8))
 
 
-def _spread(data: Data, fit: Fit) -> Fit:
-    return replace(fit, spread=covariance(data, fit)) if fit.structure.causes else fit
+def _spread(prepared: Prepared, data: Data, fit: Fit) -> Fit:
+    return replace(fit, spread=covariance(data, prepared.short, fit)) if fit.structure.causes else fit
 
 
 def believed_structure(model: Model, prepared: Prepared) -> Structure:

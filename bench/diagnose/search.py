@@ -33,7 +33,7 @@ PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexplained: so little more is none
-LITTLE = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
+QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
 CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 MOST_CAUSES = 3
@@ -344,7 +344,7 @@ class Search:
         if self.prepared.memory == 1.0:
             return
         last, prepared = path.fits[-1], self.prepared
-        if mean_square(prepared.full, last.structure, last.x) < LITTLE * prepared.floor_N**2:
+        if mean_square(prepared.full, last.structure, last.x) < QUIET * prepared.floor_N**2:
             self.prepared = prepared.white()
             path.fits = [refit(self.short, f.structure, f.x, 20, 1e-8) for f in path.fits]
 

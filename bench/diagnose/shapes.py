@@ -46,14 +46,13 @@ class Member:
         return dict(zip([p.name for p in s.causes[self.index].fitted], spread.tolist(), strict=True))
 
 
-def stand_in(data: Data, fit: Fit) -> tuple[Data, Fit, list[int]]:
-    """Short data, the fit carried on there without what detectors find, and which of its causes are left."""
-    short = data if data.short is None else data.short
+def stand_in(short: Data, fit: Fit) -> tuple[Fit, list[int]]:
+    """The fit carried on with short data, without what detectors find, and which of its causes are left."""
     kept = [i for i, c in enumerate(fit.structure.causes) if c.id not in CHANNEL]
     structure = replace(fit.structure, causes=tuple(fit.structure.causes[i] for i in kept))
     values = fit.structure.values(fit.x)
     x = structure.x(fit.x[: len(structure.pad.coordinates)], [values[i] for i in kept], fit.of_run)
-    return short, refit(short, structure, x, STEPS, 1e-6), kept
+    return refit(short, structure, x, STEPS, 1e-6), kept
 
 
 def families(short: Data, lead: Fit, indices: Sequence[int]) -> list[list[Member]]:
@@ -83,9 +82,9 @@ def scores(short: Data, members: Sequence[Member]) -> Array:
     return np.array([m.fit.chi2 / scale + cost * m.fit.free for m in members])
 
 
-def reshaped(data: Data, fit: Fit, own: int = 0) -> Fit:
+def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
     """The fit with each of its causes in the best of its shapes; `own`: causes at the begin that stay as they are."""
-    short, lead, kept = stand_in(data, fit)
+    lead, kept = stand_in(short, fit)
     if len(kept) < len(fit.structure.causes):
         return fit
     lead = taken = replace(lead, x=missing_told(lead, lead.structure))

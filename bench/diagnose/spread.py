@@ -19,12 +19,13 @@ Array = NDArray[np.float64]
 UNKNOWN = 1.0  # variance of a logarithm with which nothing in the data moves
 
 
-def covariance(data: Data, fit: Fit) -> Array:
-    """Of x (P, P), 0 at bounds, in units of the noise. `fit`: at its minimum on `data`."""
+def covariance(data: Data, short: Data, fit: Fit) -> Array:
+    """Of x (P, P), 0 at bounds, in units of the noise. `fit`: at its minimum on `data`; `short`: the stand-in for them,
+    free of hum."""
     if not len(fit.x):
         return np.zeros((0, 0))
     own = of_the_noise(data, fit)
-    return own + np.diag(_of_the_shapes(data, fit, np.diag(own).copy()))
+    return own + np.diag(_of_the_shapes(short, fit, np.diag(own).copy()))
 
 
 def of_the_noise(data: Data, fit: Fit) -> Array:
@@ -42,7 +43,7 @@ def of_the_noise(data: Data, fit: Fit) -> Array:
     return sandwich([e], [J], here.covariance(), square * prior, here.free).covariance
 
 
-def _of_the_shapes(data: Data, fit: Fit, own: Array) -> Array:
+def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
     """What the choice among shapes that the data cannot tell apart adds to the variances of x (P,).
 
     Each shape of a cause's family weighs as its χ² tells it (K. P. Burnham, D. R. Anderson, Model Selection and
@@ -50,7 +51,7 @@ def _of_the_shapes(data: Data, fit: Fit, own: Array) -> Array:
     cannot tell says no more about another's than that one itself does.
     """
     out = np.zeros(len(fit.x))
-    short, lead, kept = stand_in(data, fit)
+    lead, kept = stand_in(short, fit)
     every = fit.structure.values(fit.x)
     for place, members in zip(kept, families(short, lead, range(len(kept))), strict=True):
         weight = _weights(scores(short, members))

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from bench.errors import InputError, Refused
-from bench.recording.lock import hold
+from bench.recording.lock import holding
 
 RECORDING = "recording.mcap"
 MODEL = "model.yaml"
@@ -48,9 +47,8 @@ def own_folder(protocol_name: str, out: Path | None, now: datetime.datetime) -> 
     Raises `InputError` where `out` is not empty or another run has it, or where it cannot be made.
     """
     folder, made = _made(protocol_name, out, now)
-    descriptor = _opened(folder)
-    try:
-        if descriptor is not None and not hold(descriptor):
+    with holding(folder) as ours:
+        if not ours:
             raise InputError(str(folder), "another run has it", "give --out a new folder: no run overwrites another")
         must_be_free(folder)  # by now another may have begun and ended there
         try:
@@ -60,9 +58,6 @@ def own_folder(protocol_name: str, out: Path | None, now: datetime.datetime) -> 
             if made:
                 discard(folder)
             raise
-    finally:
-        if descriptor is not None:
-            os.close(descriptor)
 
 
 def _made(protocol_name: str, out: Path | None, now: datetime.datetime) -> tuple[Path, bool]:
@@ -88,14 +83,6 @@ def _made_now(folder: Path) -> bool:
     except FileExistsError:
         return False
     return True
-
-
-def _opened(folder: Path) -> int | None:
-    """The folder open, to be held; None where a system opens none."""
-    try:
-        return os.open(folder, os.O_RDONLY)
-    except OSError:
-        return None
 
 
 def _try_writing(folder: Path) -> None:

@@ -22,33 +22,34 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
-from sim.jit import State, block
+from sim.jit import State, block, compiled
 
 _LAST, _TRAVEL = range(2)
 _LEAST = 0.02
 
 
+@compiled("UniTuple(float64, 2)(float64, float64, float64, float64)")
+def loaded(depth: float, dead_band: float, last: float, travel: float) -> tuple[float, float]:
+    """(depth from which a further gain counts, loading travel), after the probe has come to a depth."""
+    here = max(depth, 0.0)
+    gained = here - dead_band - last
+    if gained > 0.0:
+        travel += gained
+        last += gained
+    return min(last, here), travel
+
+
 @block
 def exponential(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, floor, dead_band)."""
-    here = max(depth, 0.0)
-    gained = here - p[2] - state[_LAST]
-    if gained > 0.0:
-        state[_TRAVEL] += gained
-        state[_LAST] += gained
-    state[_LAST] = min(state[_LAST], here)
+    state[_LAST], state[_TRAVEL] = loaded(depth, p[2], state[_LAST], state[_TRAVEL])
     return p[1] + (1.0 - p[1]) * math.exp(-p[0] * state[_TRAVEL] / (1.0 - p[1]))
 
 
 @block
 def power(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, power, dead_band)."""
-    here = max(depth, 0.0)
-    gained = here - p[2] - state[_LAST]
-    if gained > 0.0:
-        state[_TRAVEL] += gained
-        state[_LAST] += gained
-    state[_LAST] = min(state[_LAST], here)
+    state[_LAST], state[_TRAVEL] = loaded(depth, p[2], state[_LAST], state[_TRAVEL])
     lost = p[0] * state[_TRAVEL]
     if abs(p[1]) < 1e-6:
         return max(_LEAST, math.exp(-lost))
@@ -59,24 +60,14 @@ def power(dt: float, depth: float, state: State, p: State) -> float:
 @block
 def hyperbolic(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, dead_band)."""
-    here = max(depth, 0.0)
-    gained = here - p[1] - state[_LAST]
-    if gained > 0.0:
-        state[_TRAVEL] += gained
-        state[_LAST] += gained
-    state[_LAST] = min(state[_LAST], here)
+    state[_LAST], state[_TRAVEL] = loaded(depth, p[1], state[_LAST], state[_TRAVEL])
     return 1.0 / (1.0 + p[0] * state[_TRAVEL])
 
 
 @block
 def linear(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, dead_band)."""
-    here = max(depth, 0.0)
-    gained = here - p[1] - state[_LAST]
-    if gained > 0.0:
-        state[_TRAVEL] += gained
-        state[_LAST] += gained
-    state[_LAST] = min(state[_LAST], here)
+    state[_LAST], state[_TRAVEL] = loaded(depth, p[1], state[_LAST], state[_TRAVEL])
     return max(_LEAST, 1.0 - p[0] * state[_TRAVEL])
 
 

@@ -74,7 +74,7 @@ def in_contact(recording: Recording) -> Delay | None:
     prepared = prepare(later, np.ones(later.force_N.size, dtype=bool))
     structure = believed_structure(Model.model_validate(content), prepared)
     fit = refit(prepared.full, structure, structure.x(structure.pad.x()), 60, 1e-9)
-    number = described(replace(fit, spread=covariance(prepared.full, fit)), 0)[2]["delay"]
+    number = described(replace(fit, spread=covariance(prepared.full, prepared.short, fit)), 0)[2]["delay"]
     if not math.isfinite(number.std) or number.std > MOST_DOUBT_S:
         return None
     rms_N = math.sqrt(mean_square(prepared.full, structure, fit.x))

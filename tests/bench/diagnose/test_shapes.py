@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose.channel import faults, not_of_the_motion
-from bench.diagnose.data import Data, prepare
+from bench.diagnose.data import Prepared, prepare
 from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.refit import Fit, onto, refit
@@ -21,7 +21,7 @@ from tests.truth.cases import Case, draw_case
 
 
 @cache
-def fitted(id: str, shape: str, form: str, size: float = 1.0, seed: int = 1, **told: Any) -> tuple[Case, Data, Fit]:
+def fitted(id: str, shape: str, form: str, size: float = 1.0, seed: int = 1, **told: Any) -> tuple[Case, Prepared, Fit]:
     """A hidden effect, and the fit of one form of it, from the true numbers."""
     c = draw_case(seed, (id,), size, shape, **({"protocol": "rich", "rate_hz": 120.0, "jitter": "none"} | told))
     m = measurement(c)
@@ -30,7 +30,7 @@ def fitted(id: str, shape: str, form: str, size: float = 1.0, seed: int = 1, **t
     cause = cause_of(effect(id), effect(id).form(form), c.truth.parameters[id])
     joined = structure.with_cause(cause)
     fit = refit(p.short, joined, joined.x(structure.pad.x()), 60, 1e-9)
-    return c, p.full, onto(fit, p.full)
+    return c, p, onto(fit, p.full)
 
 
 def stated(fit: Fit, name: str) -> tuple[float, float]:
@@ -54,22 +54,22 @@ def stated(fit: Fit, name: str) -> tuple[float, float]:
     ],
 )
 def test_another_shape_that_fits_better_takes_its_place(id: str, shape: str, form: str, name: str, better: str) -> None:
-    c, data, fit = fitted(id, shape, form)
-    again = reshaped(data, fit)
+    c, p, fit = fitted(id, shape, form)
+    again = reshaped(p.short, fit)
     assert again.structure.causes[0].form.name == better
     true = c.truth.parameters[id][name]
     assert abs(stated(replace(again, spread=None), name)[0] / true - 1) < 0.1
 
 
 def test_the_best_shape_stays() -> None:
-    _, data, fit = fitted("damage", "exponential", "exponential")
-    assert reshaped(data, fit) is fit
+    _, p, fit = fitted("damage", "exponential", "exponential")
+    assert reshaped(p.short, fit) is fit
 
 
 def test_shapes_that_serve_as_well_widen_what_is_stated() -> None:
     """A small effect in noise: the shape cannot be told, and the numbers of the shapes differ."""
-    c, data, fit = fitted("force_drift", "turns", "linear", 0.3)
-    narrow, wide = (replace(fit, spread=s) for s in (of_the_noise(data, fit), covariance(data, fit)))
+    c, p, fit = fitted("force_drift", "turns", "linear", 0.3)
+    narrow, wide = (replace(fit, spread=s) for s in (of_the_noise(p.full, fit), covariance(p.full, p.short, fit)))
     true = c.truth.parameters["force_drift"]["rate"]
     value, error = stated(narrow, "rate")
     assert abs(value - true) > 2 * abs(error)  # the straight line has the mean rate and not the first
