@@ -50,9 +50,11 @@ ROWS = STARTS + len(PLACES) + 1
 X, Y, CELL, SLOPE, RESIDUAL, TRIAL_CELL = range(6)
 OUTER = 6
 # … and the pad's own, at INNER and in its trial copies: w_1 … w_r follow
-FE, PAD_DEPTH, PAD_FORCE, SURFACE, W = range(5)
+FE, PAD_DEPTH, PAD_FORCE, SURFACE, STEEPNESS, W = range(6)
 
 _TOLERANCE = 4e-15
+_BESIDE = 1e-3  # of the way to the last surface, where no slope is known
+_RESIDUE = 1e-12  # of the force that relaxes: what a pad that has let go may carry
 
 
 @compiled("float64(float64)")
@@ -96,54 +98,74 @@ def product(program: Ints, params: Doubles, state: Doubles, shift: int, place: i
 def surface_force(
     program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, s: float, A: float, B: float
 ) -> float:
-    """Force of the pad were its surface at depth `s`: A + B F^e(s) + contact(s), all blocks on a scratch copy."""
+    """Force of the pad were its surface at depth `s`: A + B F^e(s) + contact(s), all blocks on a scratch copy, which
+    stays."""
     inner, scratch = program[INNER], program[SCRATCH]
     for k in range(program[INNER_SIZE]):
         state[scratch + k] = state[inner + shift + k]
     aside = scratch - inner
     Fe = product(program, params, state, aside, ELASTIC, dt, s) * chain(program, params, state, aside, LAW, dt, s)
+    state[scratch + FE] = Fe
     return A + B * Fe + total(program, params, state, aside, CONTACT, dt, s)
 
 
 @compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64)")
 def free_surface(
-    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, low: float, A: float, B: float
+    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, depth: float, A: float, B: float
 ) -> float:
-    """Depth at which a pad that has let go carries no force; at depth `low` the force would be negative."""
-    low = max(low, 0.0)  # nothing of the pad's changes above its surface
-    f_low = surface_force(program, params, state, shift, dt, low, A, B)
-    high = max(low, state[program[INNER] + shift + SURFACE])
-    width = max(high - low, 1e-6)
-    high = low + width
-    f_high = surface_force(program, params, state, shift, dt, high, A, B)
+    """Depth at which a pad that has let go carries no force; `depth` itself where the force there is not below 0. The
+    scratch copy is then the state there.
+
+    Newton's steps from the last surface with the last slope, then secant steps, within a bracket: a surface recovers
+    little in a step, and the force there rises with the depth.
+    """
+    pad = program[INNER] + shift
+    tolerance = _RESIDUE * max(abs(A), 0.1)
+    low = max(depth, 0.0)  # nothing of the pad's changes above its surface
+    s = max(state[pad + SURFACE], low)
+    f = surface_force(program, params, state, shift, dt, s, A, B)
+    a, f_a = s, f
+    width = max(s - low, 1e-6)
     for _ in range(60):
-        if not f_high < 0.0:
+        if not f < -tolerance:
             break
-        low, f_low = high, f_high
+        a, f_a, low = s, f, s
+        s += width
         width *= 2.0
-        high += width
-        f_high = surface_force(program, params, state, shift, dt, high, A, B)
-    s = high
-    side = 0
-    for _ in range(200):
-        s = high - f_high * (high - low) / (f_high - f_low)
-        if not low < s < high:
-            s = 0.5 * (low + high)
-        if not low < s < high:
-            break
         f = surface_force(program, params, state, shift, dt, s, A, B)
-        if f < 0.0:
-            low, f_low = s, f
-            if side == -1:  # Illinois: the end that stays loses half its weight
-                f_high *= 0.5
-            side = -1
-        else:
-            high, f_high = s, f
-            if side == 1:
-                f_low *= 0.5
-            side = 1
-        if abs(f) <= 1e-15:
+    high = s
+    slope = (f - f_a) / (s - a) if s > a else state[pad + STEEPNESS]
+    stale = 0
+    sure = False  # that the force at `depth` is below 0
+    for _ in range(200):
+        if abs(f) <= tolerance:
             break
+        c = s - f / slope if slope > 0.0 else high - _BESIDE * (high - low)
+        if not c < high or stale > 2:
+            c = 0.5 * (low + high)
+            stale = 0
+        if not low < c:
+            if not sure:
+                sure = True
+                f = surface_force(program, params, state, shift, dt, depth, A, B)
+                if f >= 0.0:
+                    return depth
+            c = 0.5 * (low + high)
+        if not low < c < high:  # nothing lies between
+            break
+        before = high - low
+        a, f_a = s, f
+        s = c
+        f = surface_force(program, params, state, shift, dt, s, A, B)
+        if s != a:
+            slope = (f - f_a) / (s - a)
+        if f < 0.0:
+            low, sure = s, True
+        else:
+            high = s
+        stale = stale + 1 if high - low > 0.5 * before else 0
+    if slope > 0.0:
+        state[pad + STEEPNESS] = slope
     return float(s)
 
 
@@ -175,21 +197,28 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
     lasting = program[STARTS + ELASTIC] == program[STARTS + ELASTIC + 1]  # nothing remembers where the surface was
     off = False
     if program[UNILATERAL] != 0 and not (simple and lasting):
-        off = surface_force(program, params, state, shift, dt, depth, A, B) < 0.0
-        if off:
+        # a pad that has let go is asked first where its surface is now
+        apart = depth < state[pad + SURFACE] and state[pad + PAD_DEPTH] < state[pad + SURFACE]
+        F = -1.0 if apart else surface_force(program, params, state, shift, dt, depth, A, B)
+        if F < 0.0:
             surface = free_surface(program, params, state, shift, dt, depth, A, B)
-    felt = surface if off else depth
-    Fe = product(program, params, state, shift, ELASTIC, dt, felt) * chain(program, params, state, shift, LAW, dt, felt)
-    F = A + B * Fe
-    if program[UNILATERAL] != 0 and simple and lasting:
-        off = F < 0.0
-    own = total(program, params, state, shift, CONTACT, dt, felt)
+            off = surface > depth
+            F = 0.0 if off else surface_force(program, params, state, shift, dt, depth, A, B)
+            surface = max(surface, 0.0)
+        scratch = program[SCRATCH] - program[INNER]
+        Fe = state[pad - shift + scratch + FE]
+        for k in range(W + r, program[INNER_SIZE]):  # what the blocks remember
+            state[pad + k] = state[pad - shift + scratch + k]
+    else:
+        Fe = product(program, params, state, shift, ELASTIC, dt, depth)
+        Fe *= chain(program, params, state, shift, LAW, dt, depth)
+        F = A + B * Fe
+        off = program[UNILATERAL] != 0 and F < 0.0
+        F += total(program, params, state, shift, CONTACT, dt, depth)
     if off:
         if plain:
             Fe = -A / B if B > 0.0 else 0.0
         F = 0.0
-    else:
-        F += own
     for i in range(r):
         w = state[pad + W + i]
         state[pad + W + i] = state[cache + 1 + i] * w + state[cache + 1 + r + i] * (Fe - old)

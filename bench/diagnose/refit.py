@@ -15,7 +15,7 @@ from .numbers import Structure
 
 Array = NDArray[np.float64]
 
-RENEWED = 3  # steps for which derivatives are good
+RENEWED, OFF = 6, 1.0  # steps for which derivatives are good, where they foretold the last one but for this share
 STEP = 1e-5  # of a coordinate of order one, for derivatives
 
 
@@ -129,38 +129,51 @@ def refit(
     """
     prior = structure.prior
     last: list[Array] = []  # x, force and derivatives of the step before
-    steps = 0
+    tried: list[Array] = []  # x and force of the last trial: the one that is taken is asked for again
+    age = 0
+
+    def force_of(x: Array) -> Array:
+        if not tried or not np.array_equal(tried[0], x):
+            tried[:] = [x.copy(), force_at(data, structure, x)]
+        return tried[1]
 
     def derivatives(x: Array, force: Array) -> Array:
-        """By differences at every third step, else carried on by the secant (C. G. Broyden, Math. Comp. 19, 1965)."""
-        nonlocal steps
-        if steps % RENEWED == 0 or not last:
-            J = jacobian(data, structure, x, force, known)
-            J[~np.isfinite(J)] = 0.0
-        else:
+        """By differences, or carried on by the secant (C. G. Broyden, Math. Comp. 19, 1965) while that is near."""
+        nonlocal age
+        J, off = None, np.inf
+        if last and age < RENEWED:
             before, then, J = last
             way = x - before
-            square = float(np.sum(way * way))
-            if square > 0.0:
-                J = J + np.outer((data.whitened(force - then) - np.sum(J * way, axis=1)) / square, way)
-        steps += 1
+            change, foretold = data.whitened(force - then), np.sum(J * way, axis=1)
+            size = float(np.sum(foretold * foretold))
+            miss = change - foretold
+            off = float(np.sum(miss * miss)) / size if size > 0.0 else np.inf
+        if J is None or off > OFF**2:
+            J = jacobian(data, structure, x, force, known)
+            J[~np.isfinite(J)] = 0.0
+            age = 0
+        else:
+            J = J + np.outer(miss / float(np.sum(way * way)), way)
+        age += 1
         last[:] = [x.copy(), force, J]
         return J
 
     def normal(x: Array) -> tuple[float, Array, Array]:
-        force = force_at(data, structure, x)
+        force = force_of(x)
         J = derivatives(x, force)
         e = data.whitened(data.force_N - force)
         value = float(np.sum(e * e) + np.sum(prior * x**2))
         gradient, matrix = products(e, J)
         return value, gradient - prior * x, matrix + np.diag(prior)
 
+    def cost(x: Array) -> float:
+        e = data.whitened(data.force_N - force_of(x))
+        return float(np.sum(e * e) + np.sum(prior * x**2))
+
     if not len(x0):  # a bench in air, and nothing in doubt: there is nothing to fit
         return Fit(structure, x0, chi2(data, structure, x0), np.zeros((0, 0)), True)
-    solution = minimise(
-        normal, lambda x: chi2(data, structure, x), x0, structure.lower, structure.upper, max_steps, tolerance
-    )
-    if exact and steps > 1:  # the matrix says how sure the numbers are
+    solution = minimise(normal, cost, x0, structure.lower, structure.upper, max_steps, tolerance)
+    if exact and age > 1:  # the matrix says how sure the numbers are
         J = jacobian(data, structure, solution.x)
         J[~np.isfinite(J)] = 0.0
         return Fit(structure, solution.x, solution.cost, products(J[:, 0], J)[1] + np.diag(prior), solution.converged)
