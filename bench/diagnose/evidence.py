@@ -55,6 +55,12 @@ def threshold(freedom: int) -> float:
     return float(chi2_law.isf(LEVEL / TRIED, max(freedom, 1)))
 
 
+def least_gain(base: Fit, memory: float, samples: float, expected: float, first: bool) -> float:
+    """Δχ² that a cause must reach at the least to pay."""
+    need = max(threshold(1) * memory, CRUMB * samples)
+    return need if first else max(need, min(SHARE * (base.chi2 - expected), SPEAKS * samples))
+
+
 def evidence_of(before: Fit, after: Fit, base: Fit, memory: float, samples: float, expected: float) -> Evidence:
     """What the step from `before` to `after` is worth; `memory`: samples that say the same as one, which χ² does not
     know of; `expected`: χ² that noise alone leaves."""

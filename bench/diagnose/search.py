@@ -19,7 +19,7 @@ from sim.effects import Form
 
 from .candidates import CHANNEL, Reach, Signatures, Start, forms, is_rich, starts
 from .data import Data, Prepared
-from .evidence import Evidence, believable, evidence_of, penalty, unexplained
+from .evidence import Evidence, believable, evidence_of, least_gain, penalty, unexplained
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, extended, force_at, jacobian, mean_square, reduced, refit
@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
+FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the least
+HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
 WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
@@ -120,8 +122,8 @@ class Search:
 
     # --- candidates ------------------------------------------------------------------------------------------------
 
-    def ranked(self, fit: Fit, only: Sequence[str] | None = None) -> list[Trial]:
-        """The candidates joined to a fit: the best form of each id, best first."""
+    def ranked(self, fit: Fit, only: Sequence[str] | None = None, least: float = 0.0) -> list[Trial]:
+        """The candidates joined to a fit: the best form of each id, best first. `least`: Δχ² that is of any use."""
         signatures = Signatures(self.short, fit)
         wanted = [
             pair
@@ -136,7 +138,7 @@ class Search:
         with ThreadPoolExecutor(WORKERS) as pool:
             for pair, found in zip(wanted, pool.map(lambda p: starts(signatures, *p), wanted), strict=True):
                 by_id.setdefault(pair[0].id, []).extend(found)
-            promising = self._promising(by_id) if only is None else list(by_id)
+            promising = self._promising(by_id, least) if only is None else list(by_id)
             self.progress(f"{len(promising)} candidates")
             believed = self._as_believed(fit)
             sieved = dict(
@@ -147,16 +149,19 @@ class Search:
                 )
             )
             order = sorted((i for i in promising if sieved[i]), key=lambda i: sieved[i][0].score)
-            wide = list(pool.map(lambda i: self._widened(fit, sieved[i], family[i]), order[:SECOND]))
+            second = _worth(fit, [sieved[i] for i in order], SECOND)
+            wide = list(pool.map(lambda i: self._widened(fit, sieved[i], family[i]), order[:second]))
             wide.sort(key=lambda trials: trials[0].score)
-            self.progress(f"closer: {', '.join(trials[0].id for trials in wide[:THIRD])}")
-            ended = list(pool.map(lambda trials: [self._carried(t, ALL) for t in _contenders(trials)], wide[:THIRD]))
+            third = _worth(fit, wide, THIRD)
+            self.progress(f"closer: {', '.join(trials[0].id for trials in wide[:third])}")
+            close = [_contenders(fit, trials) for trials in wide[:third]]
+            ended = list(pool.map(lambda trials: [self._carried(t, ALL) for t in trials], close))
             best = min((t for trials in ended for t in trials), key=lambda t: t.score, default=None)
             if best is not None:
                 again = pool.map(lambda trials: self._relaxing_as(best, min(trials, key=lambda t: t.score)), ended)
                 ended = [[*trials, *new] for trials, new in zip(ended, again, strict=True)]
-        found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[THIRD:]]]
-        found_all += [sieved[i][0] for i in order[SECOND:]]
+        found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[third:]]]
+        found_all += [sieved[i][0] for i in order[second:]]
         found_all.sort(key=lambda t: t.score)
         return self._plainer(fit, sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score))
 
@@ -202,11 +207,11 @@ class Search:
                 out[id_] = min([again, *([out[id_]] if id_ in out else [])], key=lambda t: t.score)
         return list(out.values())
 
-    def _promising(self, by_id: dict[str, list[Start]]) -> list[str]:
+    def _promising(self, by_id: dict[str, list[Start]], least: float) -> list[str]:
         """Ids whose first-order signature takes anything worth while, and those that have none."""
         promise = {id_: max((s.promise for s in found), default=0.0) for id_, found in by_id.items()}
         finite = [p for p in promise.values() if np.isfinite(p)]
-        least = max(0.01 * max(finite, default=0.0), 8.0 * self.prepared.memory)
+        least = max(0.01 * max(finite, default=0.0), 8.0 * self.prepared.memory, FORETOLD * least)
         order = sorted((i for i in promise if promise[i] >= least), key=lambda i: -promise[i])
         return order[:WORTH]
 
@@ -311,7 +316,9 @@ class Search:
         begun = time.process_time()
         while len(path.fits) <= MOST_CAUSES and time.process_time() - begun < LONGEST_S:
             self._whitened(path)
-            every = [t for t in self.ranked(path.fits[-1]) if believable(t.fit, self.prepared)]
+            first, memory = len(path.fits) == 1, self.prepared.memory
+            least = least_gain(path.fits[0], memory, self.samples, self.expected, first)
+            every = [t for t in self.ranked(path.fits[-1], least=least) if believable(t.fit, self.prepared)]
             present = {c.id for c in path.fits[-1].structure.causes}
             ranked = [t for t in every if t.id not in present]
             if not ranked:
@@ -413,6 +420,14 @@ def _usual(trial: Trial) -> bool:
     return trial.cause.form.name == trial.cause.effect.forms[0].name
 
 
-def _contenders(trials: list[Trial]) -> list[Trial]:
-    """The best two of a family, and the best of its first form."""
-    return [*trials[:2], *[t for t in trials[2:] if _usual(t)][:1]]
+def _worth(fit: Fit, ranked: Sequence[Sequence[Trial]], most: int) -> int:
+    """How many of some families, best first, take enough to be looked at more closely."""
+    gains = [fit.chi2 - trials[0].fit.chi2 for trials in ranked[:most]]
+    return next((k for k, gain in enumerate(gains) if k > 1 and gain < HOPEFUL * max(gains)), len(gains))
+
+
+def _contenders(fit: Fit, trials: list[Trial]) -> list[Trial]:
+    """Of a family the best, and, where they are not far behind, the next best and the best of its first form."""
+    gained = fit.chi2 - trials[0].fit.chi2
+    others = [t for t in trials[1:] if fit.chi2 - t.fit.chi2 > CLOSE * gained]
+    return [trials[0], *others[:1], *[t for t in others[1:] if _usual(t)][:1]]
