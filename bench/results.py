@@ -13,14 +13,15 @@ import numpy as np
 
 from bench import identify
 from bench.diagnose import diagnose
-from bench.diagnose.next_test import bench_in, design
+from bench.diagnose.next_test import design
 from bench.diagnose.words import force
 from bench.diagnose.words import lines as diagnosis_lines
 from bench.errors import InputError, PadbenchError
 from bench.fitview import fit_view
+from bench.given import bench_in, model_in, prediction_in
 from bench.modelfile import write_model
 from bench.recording import Recording, read_recording
-from bench.recording.schemas import BENCH_FILE, NO_SURFACE
+from bench.recording.schemas import NO_SURFACE
 from bench.report import Plan as PlannedCurve
 from bench.report import write_report
 from bench.run.folder import FIT, MODEL, REPORT
@@ -71,12 +72,15 @@ def analyse(
     """Fit and diagnose the recording of a run folder; write model.yaml, fit.json, diagnosis.json and report.html.
 
     `structure`: `law`, `order`, `contact`, `degree` of the fit, where they are not to be found out (as `identify.fit`).
-    Diagnosed is `believed`, or else the fit; a run in air tells of the bench alone. What cannot be fitted (an air run,
+    Diagnosed is what was believed, or else the fit; a run in air tells of the bench alone. `believed` and `prediction`
+    are the recording's own where they are not given. What cannot be fitted (an air run,
     a run stopped before the pad) is said in the report, and so is what cannot be diagnosed. Raises `InputError` where
     the recording cannot be read.
     """
     tell = progress or (lambda _: None)
     recording = read_recording(folder)
+    believed = believed or model_in(recording)
+    prediction = prediction or prediction_in(recording, believed)
     fit, problem = _fit_of(recording, structure or {})
     if fit is not None:
         (folder / FIT).write_text(json.dumps(fit.to_json(), indent=2) + "\n", "utf-8")
@@ -154,9 +158,7 @@ def _diagnosis_of(
         return None, f"this is a defect of padbench, not of your run: {type(error).__name__}: {error}"
     tell("designing the next test")
     try:
-        found.next_protocol = design(
-            found, measurement, bench_in(recording.attachments.get(BENCH_FILE), recording.source)
-        )
+        found.next_protocol = design(found, measurement, bench_in(recording))
     except Exception as error:  # likewise
         found.notes.append(f"no next test could be designed: {type(error).__name__}: {error}")
     return found, ""

@@ -73,11 +73,11 @@ def main(args: argparse.Namespace) -> int:
 
 def _next(result: Diagnosis, recording: Recording, progress: Callable[[str], None]) -> dict[str, Any] | None:
     """The protocol that tells rivals apart, where there are any."""
-    from bench.diagnose.next_test import bench_in, design
-    from bench.recording.schemas import BENCH_FILE
+    from bench.diagnose.next_test import design
+    from bench.given import bench_in
 
     progress("designing the next test")
-    bench = bench_in(recording.attachments.get(BENCH_FILE), recording.source)
+    bench = bench_in(recording)
     return design(result, recording.measurement(), bench)
 
 

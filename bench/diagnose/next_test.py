@@ -234,17 +234,3 @@ def write_protocol(path: Path, content: dict[str, Any]) -> None:
     """The protocol as a YAML file that `padbench check` and `run` take."""
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
     path.write_text(f"# Written by `padbench diagnose --next`.\n{text}", encoding="utf-8")
-
-
-def bench_in(measured: bytes | None, place: Path) -> Bench | None:
-    """The bench file that a recording carries, for its limits; None where there is none that can be read."""
-    from bench import yamlfile
-    from bench.config import Bench
-    from bench.errors import InputError
-
-    if measured is None:
-        return None
-    try:
-        return yamlfile.validate(yamlfile.parse(measured.decode(errors="replace"), place), Bench)
-    except InputError:
-        return None  # a bench of another version, or one that needs files beside it

@@ -144,7 +144,8 @@ def run(
         raise refusal
     out = folder / "run"
     out.mkdir()
-    outcome = run_protocol(script, bench, preflight.plan, out, progress=hook)
+    text = find_file("pad", pad).read_text("utf-8") if pad else None
+    outcome = run_protocol(script, bench, preflight.plan, out, believed_text=text, progress=hook)
     assert bench.sim_name is not None
     world = sim.world._worlds[bench.sim_name]
     return Done(outcome, read_recording(out), world, bench, preflight.plan, out)
