@@ -33,6 +33,7 @@ SHORTEST = 0.12  # of the longest period
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
+MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich
 LONGEST_REPORTED = 0.6  # of the depth, for errors of the position: longer ones are another elastic law
 
@@ -81,6 +82,9 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         lower, upper = max(lower, SHORTEST * longest_mm), min(upper, longest_mm)
     elif p.name == "reach":
         default = reach.depth_mm
+    elif p.name == "moved_at":
+        upper = min(upper, reach.span_s)
+        starts, default = tuple(share * reach.span_s for share in MOVED_AT), 0.5 * reach.span_s
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm
     elif p.name == "at_force":

@@ -307,7 +307,7 @@ class Search:
     def path(self, base: Fit) -> Path:
         """Causes one after the other while each pays; then those that others have made needless go."""
         path = Path([base])
-        recurved = False
+        recurved = 1  # fits on the path when the causes' shapes were last asked
         begun = time.process_time()
         while len(path.fits) <= MOST_CAUSES and time.process_time() - begun < LONGEST_S:
             self._whitened(path)
@@ -326,8 +326,8 @@ class Search:
             path.evidence.append(found)
             gained = now.chi2 - best.fit.chi2
             more = found.pays or now.chi2 > MISFIT * self.expected
-            if more and not recurved and len(path.fits) > 1:
-                recurved, other = True, self.recurved(now)
+            if more and len(path.fits) > recurved:
+                recurved, other = len(path.fits), self.recurved(now)
                 if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but one found of another shape
                     path.fits[-1] = other
                     del path.rivals[-1], path.measures[-1], path.evidence[-1]
