@@ -186,7 +186,7 @@ def _asked_again(
     residual = prepared.full.force_N - force_at(prepared.full, fit.structure, fit.x)
     errors = np.full(len(m.force_N), np.nan)
     errors[prepared.kept] = residual[prepared.at]
-    known = np.isfinite(errors) & ~(flags.saturated | flags.stuck)
+    known = np.isfinite(errors) & ~flags.by_itself
     outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, flags.outlier)
     if outlier.sum() == flags.outlier.sum() and np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
@@ -224,7 +224,7 @@ def _concluded(
         verdict = "explained" if explains(left, causes) else "unexplained"
     else:
         verdict = "unexplained" if told and excess[0] > TOLD * floor**2 else "consistent"
-    flagged = ~flags.good[prepared.kept]
+    flagged = flags.flagged[prepared.kept]
     inside = m.counted()[prepared.kept]
     good = raw.weight[at] > 0
     return Diagnosis(
