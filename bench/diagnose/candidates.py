@@ -292,8 +292,9 @@ def _inside(value: float, lower: float, upper: float) -> float:
     return min(max(value, lower), upper)
 
 
-def _amended(fit: Fit, cause: Cause) -> list[Cause]:
-    """Another law in place of the believed: numbers with which it is near the curve that was fitted."""
+def _amended(fit: Fit, cause: Cause, found: int | None = None) -> list[Cause]:
+    """Another law in place of the believed: numbers with which it is near the curve that was fitted, or near that of
+    the fit's cause `found`."""
     structure = fit.structure
     pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
     fitted = cause.fitted
@@ -302,7 +303,9 @@ def _amended(fit: Fit, cause: Cause) -> list[Cause]:
     if not fitted or amend(pad, cause.start).law == pad.law:
         return [cause]
     depth = np.linspace(0.02, 1.0, 60) * structure.pad.depth_mm
-    wanted = pad.law.force(depth)
+    drawn = None if found is None else structure.causes[found].form.amend
+    law = pad.law if drawn is None or found is None else drawn(pad, structure.values(fit.x)[found]).law
+    wanted = law.force(depth)
     scale = max(float(np.abs(wanted).max()), 1e-12)
     probe = Structure(structure.pad, (cause,))
     at = probe.of_cause(0)
@@ -327,6 +330,16 @@ def _amended(fit: Fit, cause: Cause) -> list[Cause]:
     x = base.copy()
     x[at] = best.x
     return [cause.with_start(**probe.values(x)[0])]
+
+
+def alike(fit: Fit, index: int, cause: Cause) -> Cause:
+    """Another shape of one of a fit's causes, to start from where that one is: near its curve where it is a law, and
+    else with the numbers that they share."""
+    own = fit.structure.causes[index]
+    if own.form.amend is not None and cause.form.amend is not None:
+        return _amended(fit, cause, index)[0]
+    values = fit.structure.values(fit.x)[index]
+    return cause.with_start(**{p.name: values[p.name] for p in cause.fitted if p.name in values})
 
 
 def residual_of(data: Data, fit: Fit) -> Array:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sim import effects
 from sim.effects import Form
 
-from .candidates import CHANNEL, Reach, Signatures, Start, forms, is_rich, starts
+from .candidates import CHANNEL, Reach, Signatures, Start, alike, forms, is_rich, starts
 from .data import Data, Prepared
 from .evidence import Evidence, believable, evidence_of, penalty, unexplained
 from .late import LATE, as_late, lateness_s
@@ -365,15 +365,14 @@ class Search:
             structure, x = reduced(now, index)
             without = refit(self.short, structure, x, 10, 1e-5)
             signatures = Signatures(self.short, without)
-            values = now.structure.values(now.x)[index]
             for effect, form in forms(structure, structure.in_air, self.reach, also_unsought=True):
                 if effect.id != cause.id or form.name == cause.form.name:
                     continue
-                own = cause_of(effect, form)
-                shared = {p.name: values[p.name] for p in own.fitted if p.name in values}
-                for start in [own.with_start(**shared), *(s.cause for s in starts(signatures, effect, form))]:
-                    trial = self._joined(without, start, MORE, None)
-                    tried += [trial] if trial is not None else []
+                here = replace(now, structure=structure, x=x)
+                begun = [(here, alike(now, index, cause_of(effect, form)))]
+                begun += [(without, s.cause) for s in starts(signatures, effect, form)]
+                trials = [self._joined(*start, MORE, None) for start in begun]
+                tried += [t for t in trials if t is not None]
         tried = [self._carried(t, ALL) for t in sorted(tried, key=lambda t: t.score)[:2]]
         return min([now, *(t.fit for t in tried)], key=lambda fit: fit.chi2)
 
@@ -388,7 +387,8 @@ class Search:
         return evidence_of(before, after, base, self.prepared.memory, self.samples, self.expected)
 
     def exchanged(self, path: Path) -> Fit:
-        """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it."""
+        """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
+        out."""
         best = path.fits[-1]
         score = best.chi2 + self._penalty(best)
         own = len(self.believed.causes)
@@ -402,6 +402,8 @@ class Search:
                 continue
             structure, x = reduced(best, index)
             without = refit(self.short, structure, x, 10, 1e-5)
+            if without.chi2 < best.chi2:  # it was in the way
+                return refit(self.short, structure, without.x, ALL, 1e-8)
             for trial in self.ranked(without, only=rivals)[:1]:
                 if trial.score < score - 10 and believable(trial.fit, self.prepared):
                     best, score = trial.fit, trial.score
