@@ -182,7 +182,7 @@ def _spoiled(measurement: Measurement, simulated_N: Array, rmse_N: float, alone:
         return ~alone.good  # too few samples to tell
     if not rmse_N <= NEAR * noise_N:
         return ~alone.good
-    faulty = alone.saturated | alone.stuck
+    faulty = alone.by_itself
     return faulty | standing_off(measurement.force_N - simulated_N, ~faulty, alone.outlier)
 
 

@@ -33,6 +33,7 @@ SHORTEST = 0.12  # of the longest period
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
+MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich
 LONGEST_REPORTED = 0.6  # of the depth, for errors of the position: longer ones are another elastic law
 
@@ -81,6 +82,9 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         lower, upper = max(lower, SHORTEST * longest_mm), min(upper, longest_mm)
     elif p.name == "reach":
         default = reach.depth_mm
+    elif p.name == "moved_at":
+        upper = min(upper, reach.span_s)
+        starts, default = tuple(share * reach.span_s for share in MOVED_AT), 0.5 * reach.span_s
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm
     elif p.name == "at_force":
@@ -288,8 +292,9 @@ def _inside(value: float, lower: float, upper: float) -> float:
     return min(max(value, lower), upper)
 
 
-def _amended(fit: Fit, cause: Cause) -> list[Cause]:
-    """Another law in place of the believed: numbers with which it is near the curve that was fitted."""
+def _amended(fit: Fit, cause: Cause, found: int | None = None) -> list[Cause]:
+    """Another law in place of the believed: numbers with which it is near the curve that was fitted, or near that of
+    the fit's cause `found`."""
     structure = fit.structure
     pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
     fitted = cause.fitted
@@ -298,7 +303,9 @@ def _amended(fit: Fit, cause: Cause) -> list[Cause]:
     if not fitted or amend(pad, cause.start).law == pad.law:
         return [cause]
     depth = np.linspace(0.02, 1.0, 60) * structure.pad.depth_mm
-    wanted = pad.law.force(depth)
+    drawn = None if found is None else structure.causes[found].form.amend
+    law = pad.law if drawn is None or found is None else drawn(pad, structure.values(fit.x)[found]).law
+    wanted = law.force(depth)
     scale = max(float(np.abs(wanted).max()), 1e-12)
     probe = Structure(structure.pad, (cause,))
     at = probe.of_cause(0)
@@ -323,6 +330,16 @@ def _amended(fit: Fit, cause: Cause) -> list[Cause]:
     x = base.copy()
     x[at] = best.x
     return [cause.with_start(**probe.values(x)[0])]
+
+
+def alike(fit: Fit, index: int, cause: Cause) -> Cause:
+    """Another shape of one of a fit's causes, to start from where that one is: near its curve where it is a law, and
+    else with the numbers that they share."""
+    own = fit.structure.causes[index]
+    if own.form.amend is not None and cause.form.amend is not None:
+        return _amended(fit, cause, index)[0]
+    values = fit.structure.values(fit.x)[index]
+    return cause.with_start(**{p.name: values[p.name] for p in cause.fitted if p.name in values})
 
 
 def residual_of(data: Data, fit: Fit) -> Array:

@@ -31,6 +31,11 @@ CEILING = 8  # samples in a row at the greatest force
 CALMED, AMID = 9, 0.3  # samples over which, and share of the usual change of slope below which, the noise has gone
 TOP, DISTINCT = 0.8, 3  # of the greatest force: where a ceiling that gives way still is; and values that it passes
 FEW_BESIDE = 0.05  # of the samples at a ceiling that moves: so few others as high are at it too
+WIDEST_KNEE, USUAL_KNEE = 0.5, 0.1  # of a ceiling, that a knee is wide at the most, and where the noise does not tell
+AT_LAST = 0.75  # of a knee, where it is at its end
+NARROWED, SLOW, JUMPS = 2.0, 4.0, 4.0  # usual second differences: below a ceiling, where any narrows the noise; that
+# a slow force changes by; and the largest that count
+BENT = 15.0  # logarithm of the likelihood that a width must gain over none to be known, or lose to be excluded
 SLOWED = (2, 3, 4)  # samples that a channel says one value for, when it is for a while that much slower
 BESIDE = 5  # neighbours on either side that a stray sample is held against: bursts are shorter
 ASIDE, CALM = 8, 0.6  # neighbours on either side of a residual, and the share of them that a burst leaves alone
@@ -45,34 +50,46 @@ RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit,
 
 @dataclass(frozen=True)
 class Faults:
-    """Of each force sample (m,), whether it is at a ceiling, repeats the one before, or stands off. `limit_N`: the
-    ceiling, where there is one. `stuck_share`: share that sticks, where single samples cannot all be told."""
+    """Of each force sample (m,), whether it is at a ceiling, repeats the one before, or stands off. `bent`: below a
+    ceiling that is or may be not sharp, where it is no fault yet and not quite the force either: left out, and not
+    flagged. `limit_N`: the ceiling, where there is one. `stuck_share`: share that sticks, where single samples cannot
+    all be told."""
 
     saturated: Mask
     stuck: Mask
     outlier: Mask
+    bent: Mask
     limit_N: float | None = None
     stuck_share: float | None = None
 
     @property
-    def good(self) -> Mask:
-        """Samples that tell of the force."""
-        return ~(self.saturated | self.stuck | self.outlier)
+    def by_itself(self) -> Mask:
+        """Samples that tell nothing of the force, whatever a model may say of them."""
+        return self.saturated | self.stuck | self.bent
 
     @property
-    def fraction(self) -> float:
-        """Share of samples flagged."""
-        return float(np.mean(~self.good))
+    def good(self) -> Mask:
+        """Samples that tell of the force."""
+        return ~(self.by_itself | self.outlier)
+
+    @property
+    def flagged(self) -> Mask:
+        """Samples that a fault has made."""
+        return self.saturated | self.stuck | self.outlier
 
 
 def faults(force_N: Array) -> Faults:
     """What the samples (m,) show by themselves."""
     none = np.zeros(len(force_N), dtype=bool)
     if len(force_N) < 30:
-        return Faults(none, none, none)
+        return Faults(none, none, none, none)
     saturated, limit = _ceiling(force_N)
     yielding, top = _yielding(force_N)
     saturated, limit = saturated | yielding, top if limit is None else limit
+    bent = none
+    if limit is not None:
+        bent, ended = _knee(force_N, saturated, limit)
+        saturated, bent = saturated | ended, bent & ~(saturated | ended)
     # just below a ceiling that is not sharp a channel repeats itself too
     ended = saturated if limit is None else saturated | (force_N * np.sign(limit) > NEARLY * abs(limit))
     stuck = _stuck(force_N, ended) | _slowed(force_N, ended)
@@ -81,18 +98,25 @@ def faults(force_N: Array) -> Faults:
         stuck = halted
     outlier = _spikes(force_N, ~(saturated | stuck))
     again = _stray_again(force_N, outlier, stuck)
-    return Faults(saturated, stuck & ~again, outlier | again, limit, share if stuck is halted else None)
+    return Faults(
+        saturated, stuck & ~again, outlier | again, bent & ~(stuck | outlier | again), limit,
+        share if stuck is halted else None,
+    )  # fmt: skip
 
 
 def _stray_again(force: Array, outlier: Mask, stuck: Mask) -> Mask:
     """Stuck samples that say a stray value again, and samples with the one value that stray ones have where readings
     have many digits: what is read when nothing is there."""
     first, length = _runs(force)
-    again = np.repeat(outlier[first], length) & stuck
+    return (np.repeat(outlier[first], length) & stuck) | (_one_value(force, outlier) & ~outlier)
+
+
+def _one_value(force: Array, outlier: Mask) -> Mask:
+    """Samples with a value that stray ones have again and again, where readings have many digits."""
     values, count = np.unique(force[outlier], return_counts=True)
     if resolution(force) == 0.0 and _never_equal(force, int(count.max(initial=0))):
-        again |= np.isin(force, values[count >= FEW_REPEATS]) & ~outlier
-    return again
+        return np.isin(force, values[count >= FEW_REPEATS])
+    return np.zeros(len(force), dtype=bool)
 
 
 def _runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -145,11 +169,14 @@ def _yielding(force: Array) -> tuple[Mask, float | None]:
         edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]]))).reshape(-1, 2)
         for first, last in edges.tolist():
             core = force[first:last]
-            # a value that only stays the same sticks
-            if last - first < CEILING or len(np.unique(core)) < DISTINCT:
+            # a value that only stays the same sticks: it is what is beside it that must be calm
+            at, long = _runs(core)
+            k = int(np.argmax(long))
+            apart = np.concatenate([bend[first - 1 : first + at[k]], bend[first + at[k] + long[k] - 2 : last - 1]])
+            if len(apart) < CEILING or len(long) < DISTINCT:
                 continue
-            quiet = float(np.mean(bend[first - 1 : last - 1])) / usual
-            if (last - first) * np.log(max(quiet, 1e-3)) > np.log(CHANCE) - 4.0:
+            quiet = float(np.mean(apart)) / usual
+            if len(apart) * np.log(max(quiet, 1e-3)) > np.log(CHANCE) - 4.0:
                 continue  # noise is as quiet as that by chance
             slope = float(np.median(np.diff(core))) if step == 0.0 else 0.0
             while first > 0 and abs(change[first - 1] - slope) <= near:
@@ -163,6 +190,32 @@ def _yielding(force: Array) -> tuple[Mask, float | None]:
             beyond = sign * force >= float((sign * force[mask]).min())
             return (mask | beyond if (beyond & ~mask).sum() <= FEW_BESIDE * mask.sum() else mask), sign * top
     return mask, None
+
+
+def _knee(force: Array, saturated: Mask, limit: float) -> tuple[Mask, Mask]:
+    """Samples below a ceiling that bends the force towards it, or may do so; and those that it is known to bend most.
+
+    The noise tells: it comes through with the slope of the knee. That is taken for 1 − u², u from 0 at the knee's begin
+    to 1 at the ceiling, as of a hyperbolic tangent. How wide the knee is has a likelihood, by exponential sizes of the
+    second differences. Close below the ceiling a sharp one, too, narrows the noise.
+    """
+    y, top = force * np.sign(limit), abs(limit)
+    bend = np.abs(np.diff(force, 2))
+    usual = max(float(np.mean(np.minimum(bend, np.quantile(bend, 0.9)))), 1e-9 * top)
+    level = (y[:-2] + y[1:-1] + y[2:]) / 3.0
+    free = ~(saturated[:-2] | saturated[1:-1] | saturated[2:])
+    free &= np.abs(y[2:] - y[:-2]) < SLOW * usual  # where the motion does not make the differences
+    use = free & (level > (1.0 - WIDEST_KNEE) * top) & (level < top - NARROWED * usual)
+    size, way = np.minimum(bend[use] / usual, JUMPS), (top - level[use]) / top
+    widths = np.geomspace(1e-3, WIDEST_KNEE, 40)
+    slope = [np.maximum(1.0 - np.clip(1.0 - way / width, 0.0, 1.0) ** 2, 0.05) for width in widths]
+    costs = np.array([float(np.sum(size / s + np.log(s) - size)) for s in slope])
+    if costs.min() < -BENT:
+        width = float(widths[np.argmin(costs)])
+        u = 1.0 - (top - y) / (width * top)
+        return u > 0.0, u > AT_LAST
+    unsure = widths[(costs < BENT) & (widths <= USUAL_KNEE)]
+    return y > top * (1.0 - float(unsure.max(initial=0.0))), np.zeros(len(force), dtype=bool)
 
 
 def _slowed(force: Array, but: Mask) -> Mask:
@@ -318,7 +371,8 @@ def far(values: Array) -> float:
 
 
 def not_of_the_motion(m: Measurement, found: Faults) -> Faults:
-    """Without the outliers in moves, where these have many more than the holds: transients that no model made yet."""
+    """Without the outliers in moves, where these have many more than the holds: transients that no model made yet.
+    A value that comes again and again is no transient's."""
     if not found.outlier.any():
         return found
     still = np.zeros(len(m.force_N), dtype=bool)
@@ -329,7 +383,7 @@ def not_of_the_motion(m: Measurement, found: Faults) -> Faults:
     in_holds = (found.outlier & still).sum() / max(still.sum(), 1)
     in_moves = (found.outlier & ~still).sum() / max((~still).sum(), 1)
     if still.sum() > 50 and in_moves > CROWDED * in_holds + 2.0 / max((~still).sum(), 1):
-        return replace(found, outlier=found.outlier & still)
+        return replace(found, outlier=found.outlier & (still | _one_value(m.force_N, found.outlier)))
     return found
 
 

@@ -48,6 +48,8 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
             if id_ == "stuck_samples" and flags.stuck_share is not None:
                 share, among = flags.stuck_share, max(round(count / flags.stuck_share), 1)
             numbers = {"fraction": Number(share, "1", float(np.sqrt(share * (1 - share) / among)))}
+        if id_ == "saturation":
+            mask = mask | (flags.bent[prepared.kept] & counted)
         out.append(_named(id_, effect(id_).forms[0].name, numbers, float(np.sum(error[mask] ** 2)) / n))
     return out
 

@@ -20,7 +20,7 @@ from .channel import Faults, faults, not_of_the_motion, standing_off
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS
-from .held_out import later_square
+from .held_out import held_out_square, later_square
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .refit import Fit, extended, force_at, mean_square, onto, refit
@@ -88,20 +88,27 @@ def _needless(
     prepared: Prepared, fits: list[Fit], squares: list[float], excess: list[float], apart: float
 ) -> int | None:
     """Number of a cause that is of no use for what was held out, or does harm to what comes later; None: all are."""
-    taken = [a - b for a, b in zip(squares, squares[1:], strict=False)]
-    if min(taken) <= 0.0:
-        return int(np.argmin(taken))
-    gains = [a - b for a, b in zip(excess, excess[1:], strict=False)]
-    least = int(np.argmin(gains))
-    small = gains[least] <= (LEAST if len(fits) == 2 else FURTHER) * (excess[0] + apart)
-    most_left = gains[least] >= MOST_LEFT * excess[least] and gains[least] >= SPEAKS * prepared.floor_N**2
-    if small and not most_left:
-        return least
+    own = len(fits[0].structure.causes)
+    floor = squares[-1] - excess[-1]
+    scale = excess[0] + apart
+    last = len(fits) - 2
+    order = sorted(range(last + 1), key=lambda k: squares[k] - squares[k + 1])
+    for k in order:
+        taken, gain, left = squares[k] - squares[k + 1], excess[k] - excess[k + 1], excess[k]
+        if k < last and gain <= FURTHER * scale:
+            # of two that hide each other neither is of use alone
+            alone = held_out_square(prepared, without(prepared, fits[-1], own + k))
+            taken, gain, left = alone - squares[-1], max(alone - floor, 0.0) - excess[-1], max(alone - floor, 0.0)
+        if taken <= 0.0:
+            return k
+        small = gain <= (LEAST if last == 0 else FURTHER) * scale
+        most_left = gain >= MOST_LEFT * left and gain >= SPEAKS * prepared.floor_N**2
+        if small and not most_left:
+            return k
     later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
     if all(later <= HARM * later_square(prepared, fit) for fit in fits[:-1]):
         return None
-    own = len(fits[0].structure.causes)
-    rest = [later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(len(gains))]
+    rest = [later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(last + 1)]
     best = int(np.argmin(rest))
     return best if later > HARM * rest[best] else None
 
@@ -186,7 +193,7 @@ def _asked_again(
     residual = prepared.full.force_N - force_at(prepared.full, fit.structure, fit.x)
     errors = np.full(len(m.force_N), np.nan)
     errors[prepared.kept] = residual[prepared.at]
-    known = np.isfinite(errors) & ~(flags.saturated | flags.stuck)
+    known = np.isfinite(errors) & ~flags.by_itself
     outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, flags.outlier)
     if outlier.sum() == flags.outlier.sum() and np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
@@ -224,7 +231,7 @@ def _concluded(
         verdict = "explained" if explains(left, causes) else "unexplained"
     else:
         verdict = "unexplained" if told and excess[0] > TOLD * floor**2 else "consistent"
-    flagged = ~flags.good[prepared.kept]
+    flagged = flags.flagged[prepared.kept]
     inside = m.counted()[prepared.kept]
     good = raw.weight[at] > 0
     return Diagnosis(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from sim import effects
 from sim.effects import Form
 
-from .candidates import CHANNEL, Reach, Signatures, Start, forms, is_rich, starts
+from .candidates import CHANNEL, Reach, Signatures, Start, alike, forms, is_rich, starts
 from .data import Data, Prepared
 from .evidence import Evidence, believable, evidence_of, least_gain, penalty, unexplained
 from .late import LATE, as_late, lateness_s
@@ -312,7 +312,7 @@ class Search:
     def path(self, base: Fit) -> Path:
         """Causes one after the other while each pays; then those that others have made needless go."""
         path = Path([base])
-        recurved = False
+        recurved = 1  # fits on the path when the causes' shapes were last asked
         begun = time.process_time()
         while len(path.fits) <= MOST_CAUSES and time.process_time() - begun < LONGEST_S:
             self._whitened(path)
@@ -333,8 +333,8 @@ class Search:
             path.evidence.append(found)
             gained = now.chi2 - best.fit.chi2
             more = found.pays or now.chi2 > MISFIT * self.expected
-            if more and not recurved and len(path.fits) > 1:
-                recurved, other = True, self.recurved(now)
+            if more and len(path.fits) > recurved:
+                recurved, other = len(path.fits), self.recurved(now)
                 if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but one found of another shape
                     path.fits[-1] = other
                     del path.rivals[-1], path.measures[-1], path.evidence[-1]
@@ -372,15 +372,14 @@ class Search:
             structure, x = reduced(now, index)
             without = refit(self.short, structure, x, 10, 1e-5)
             signatures = Signatures(self.short, without)
-            values = now.structure.values(now.x)[index]
             for effect, form in forms(structure, structure.in_air, self.reach, also_unsought=True):
                 if effect.id != cause.id or form.name == cause.form.name:
                     continue
-                own = cause_of(effect, form)
-                shared = {p.name: values[p.name] for p in own.fitted if p.name in values}
-                for start in [own.with_start(**shared), *(s.cause for s in starts(signatures, effect, form))]:
-                    trial = self._joined(without, start, MORE, None)
-                    tried += [trial] if trial is not None else []
+                here = replace(now, structure=structure, x=x)
+                begun = [(here, alike(now, index, cause_of(effect, form)))]
+                begun += [(without, s.cause) for s in starts(signatures, effect, form)]
+                trials = [self._joined(*start, MORE, None) for start in begun]
+                tried += [t for t in trials if t is not None]
         tried = [self._carried(t, ALL) for t in sorted(tried, key=lambda t: t.score)[:2]]
         return min([now, *(t.fit for t in tried)], key=lambda fit: fit.chi2)
 
@@ -395,7 +394,8 @@ class Search:
         return evidence_of(before, after, base, self.prepared.memory, self.samples, self.expected)
 
     def exchanged(self, path: Path) -> Fit:
-        """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it."""
+        """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
+        out."""
         best = path.fits[-1]
         score = best.chi2 + self._penalty(best)
         own = len(self.believed.causes)
@@ -409,6 +409,8 @@ class Search:
                 continue
             structure, x = reduced(best, index)
             without = refit(self.short, structure, x, 10, 1e-5)
+            if without.chi2 < best.chi2:  # it was in the way
+                return refit(self.short, structure, without.x, ALL, 1e-8)
             for trial in self.ranked(without, only=rivals)[:1]:
                 if trial.score < score - 10 and believable(trial.fit, self.prepared):
                     best, score = trial.fit, trial.score

@@ -5,6 +5,8 @@
 - `swelling`: the sine grows along the way, as towards the end of the magnets: amplitude · (1 + growth (y − at_depth)).
 - `trailing`: the sine of a place that is dragged along, as iron's field is behind the magnets': the middle of a play of
   the full width `trail`.
+- `slotted`: tanh(steepness · sin) over its own first harmonic, of that amplitude: flat over teeth and slots, steep at
+  their edges.
 
 Reference: J. F. Gieras, Z. J. Piech, B. Z. Tomczuk, Linear Synchronous Motors: Transportation and Automation Systems,
 2nd ed., CRC Press, 2012 (cogging and detent force).
@@ -13,6 +15,7 @@ Reference: J. F. Gieras, Z. J. Piech, B. Z. Tomczuk, Linear Synchronous Motors: 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC
@@ -47,6 +50,21 @@ def trailing(dt: float, y: float, state: State, p: State) -> float:
     state[1] = min(max(state[1], y - 0.5 * p[3]), y + 0.5 * p[3])
     return p[0] * math.sin(2.0 * math.pi * state[1] / p[1] + p[2])
 
+
+@block
+def slotted(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude over the first harmonic of the wave, period, phase, steepness)."""
+    return p[0] * math.tanh(p[3] * math.sin(2.0 * math.pi * y / p[1] + p[2]))
+
+
+def _of_the_first_harmonic(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `slotted` reads: a mean over half a period of equal steps, which is exact for smooth waves."""
+    sines = [math.sin(math.pi * (k + 0.5) / _STEPS) for k in range(_STEPS)]
+    first = 2.0 / _STEPS * sum(s * math.tanh(values["steepness"] * s) for s in sines)
+    return (values["amplitude"] / first, values["period"], values["phase"], values["steepness"])
+
+
+_STEPS = 64
 
 _AMPLITUDE = Parameter(
     "amplitude",
@@ -106,6 +124,18 @@ EFFECT = Effect(
             ),
             blocks={"probe": trailing},
             state=(0.0, 0.0),
+        ),
+        Form(
+            name="slotted",
+            what="flat over teeth and slots, steep at their edges",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("steepness", "1", 0.1, 10.0, 2.0, "of the edges: a sine is at 0, a square wave far above 1"),
+            ),
+            blocks={"probe": slotted},
+            pack=_of_the_first_harmonic,
         ),
     ),
 )

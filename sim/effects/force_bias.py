@@ -2,19 +2,62 @@
 
 From a tare while something touched, a cable that pulls, a probe changed after the tare, or gravity on a tilted axis.
 
-Reference: OIML R 60, Metrological regulation for load cells (zero and its shift).
+- `constant`: bias, at all times.
+- `settling`: bias · (1 + share e^(−t/τ)), as after a tare while the cell still crept.
+- `slipping`: bias · (1 + share (s(t) − ½)), s a logistic step from 0 to 1 at a time, as when a cable comes to lie
+  elsewhere.
+
+The share is small: a zero that moves by more of itself than that drifts. A drift begins at zero; a bias is there from
+the first sample on.
+
+Reference: OIML R 60, Metrological regulation for load cells (zero, its return after load, and its shift).
 """
 
 from __future__ import annotations
 
+import math
+
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
+
+_MOST = 0.3  # of the bias, by which it may change
 
 
 @block
 def bias(dt: float, force: float, state: State, p: State) -> float:
     """Force with the bias; p = (bias,)."""
     return force + p[0]
+
+
+@block
+def settling(dt: float, force: float, state: State, p: State) -> float:
+    """State: time since the first sample; p = (bias, share, time_constant)."""
+    state[0] += dt
+    return force + p[0] * (1.0 + p[1] * math.exp(-state[0] / p[2]))
+
+
+@block
+def slipping(dt: float, force: float, state: State, p: State) -> float:
+    """State: time since the first sample; p = (bias, share, moved_at, within)."""
+    state[0] += dt
+    return force + p[0] * (1.0 + 0.5 * p[1] * math.tanh((state[0] - p[2]) / p[3]))
+
+
+_BIAS = Parameter(
+    "bias",
+    "N",
+    -1e3,
+    1e3,
+    0.05,
+    "reported minus true force",
+    required=True,
+    amplitude=True,
+    floor=("force_noise_N", 0.03),
+)
+
+
+def _share(what: str) -> Parameter:
+    return Parameter("share", "1", -_MOST, _MOST, 0.1, what, default=0.0, starts=(0.1,))
 
 
 EFFECT = Effect(
@@ -24,23 +67,31 @@ EFFECT = Effect(
     check="tare in free air, with probe and cable as they are in the run",
     reference="OIML R 60, Metrological regulation for load cells",
     forms=(
+        Form(name="constant", what="the same at all times", parameters=(_BIAS,), blocks={"sensor": bias}),
         Form(
-            name="constant",
-            what="the same at all times",
+            name="settling",
+            what="a little more or less at first",
             parameters=(
-                Parameter(
-                    "bias",
-                    "N",
-                    -1e3,
-                    1e3,
-                    0.05,
-                    "reported minus true force",
-                    required=True,
-                    amplitude=True,
-                    floor=("force_noise_N", 0.03),
-                ),
+                _BIAS,
+                _share("what there is more of it at first"),
+                Parameter("time_constant", "s", 0.5, 60.0, 6.0, "time in which it settles", starts=(2.0, 6.0, 20.0)),
             ),
-            blocks={"sensor": bias},
+            sought=False,
+            blocks={"sensor": settling},
+            state=(0.0,),
+        ),
+        Form(
+            name="slipping",
+            what="a little more or less from a time on",
+            parameters=(
+                _BIAS,
+                _share("what there is more of it in the end"),
+                Parameter("moved_at", "s", 0.0, 1e6, 30.0, "time at which it moves, from the first sample on"),
+                Parameter("within", "s", 0.02, 60.0, 1.5, "half the time that the move takes"),
+            ),
+            sought=False,
+            blocks={"sensor": slipping},
+            state=(0.0,),
         ),
     ),
 )

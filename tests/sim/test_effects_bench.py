@@ -308,6 +308,16 @@ class TestPeriodic:
         force = simulate(AIR, [active("cogging", "swelling", **numbers)], x + 5, x)
         assert_allclose(force, 0.2 * (1 + 0.1 * (x - 1)) * np.sin(2 * np.pi * x / 1.6 + 0.3), atol=1e-14)
 
+    @pytest.mark.parametrize("steepness", [0.1, 2.5, 10.0])
+    def test_a_ripple_of_teeth_has_its_amplitude_in_the_first_harmonic(self, steepness: float) -> None:
+        x = -5.0 + np.arange(640) * 1.6 / 640
+        numbers = {"amplitude": 0.2, "period": 1.6, "phase": 0.3, "steepness": steepness}
+        force = simulate(AIR, [active("cogging", "slotted", **numbers)], x + 5, x)
+        angle = 2 * np.pi * x / 1.6 + 0.3
+        assert_allclose(2 * np.mean(force * np.sin(angle)), 0.2, rtol=1e-6)
+        top = force.max() / 0.2
+        assert top == pytest.approx({0.1: 1.0, 2.5: 0.8394, 10.0: 0.791}[steepness], abs=0.005)
+
     def test_a_ripple_that_trails(self) -> None:
         x = -5.0 + ramp(4.0, 801)
         numbers = {"amplitude": 0.2, "period": 1.6, "phase": 0.3, "trail": 0.2}

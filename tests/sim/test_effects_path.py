@@ -147,6 +147,13 @@ class TestBiasDriftHum:
     def test_bias(self) -> None:
         assert_allclose(sense(active("force_bias", bias=-0.2), EVEN[:3], np.array([0.0, 1.0, 2.0])), [-0.2, 0.8, 1.8])
 
+    def test_a_bias_that_moves_a_little(self) -> None:
+        t = np.array([3.0, 8.0, 13.0, 103.0])  # times count from the first sample on
+        settles = sense(active("force_bias", "settling", bias=-0.2, share=0.1, time_constant=5.0), t, np.zeros(4))
+        assert_allclose(settles, -0.2 * (1 + 0.1 * np.exp([0.0, -1.0, -2.0, -20.0])))
+        slips = sense(active("force_bias", "slipping", bias=-0.2, share=0.1, moved_at=5.0, within=0.1), t, np.zeros(4))
+        assert_allclose(slips, [-0.19, -0.2, -0.21, -0.21])
+
     @pytest.mark.parametrize("form", ["linear", "settling", "root", "logarithmic", "turning"])
     def test_all_drifts_begin_at_the_rate(self, form: str) -> None:
         t = np.array([5.0, 5.001])

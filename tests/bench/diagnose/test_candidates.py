@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.diagnose.candidates import Reach, _scanned, narrowed
+from bench.diagnose.candidates import Reach, _scanned, alike, narrowed
 from bench.diagnose.late import LATE, as_late, lateness_s
+from bench.diagnose.numbers import PadNumbers, Structure, cause_of
+from bench.diagnose.refit import Fit
 from sim.effects import effect
 from sim.effects.base import Active
 from sim.elastic import Polynomial
@@ -39,3 +41,29 @@ def test_delay_lag_and_resonance_are_as_late_as_they_say(id_):
             spring = Pad(Polynomial((0.0, 1.0)), Relaxation(), unilateral=False)
             late = Cascade(spring, [Active(effect(id_), effect(id_).forms[0], values)])
             assert time[-1] - late.simulate(time, time)[-1] == pytest.approx(late_s, rel=0.02)
+
+
+def test_a_finer_curve_starts_on_the_coarser_one_that_was_found():
+    """Numbers of one name mean something else in each: the rises to seven points, and to fifteen."""
+    law = effect("elastic_law")
+    pad = Pad(Polynomial((0.0, 2.0, 0.3)), Relaxation((0.2,), (1.0,)), unilateral=True)
+    rises = {f"rise_{i}": 0.4 + 0.15 * i for i in range(1, 8)}
+    coarse = cause_of(law, law.form("spline"), {"reach": 2.5, **rises})
+    structure = Structure(PadNumbers(pad, 2.5, 5.0), (coarse,))
+    x = structure.x(structure.pad.x(), [coarse.start])
+    fit = Fit(structure, x, 0.0, np.eye(len(x)), True)
+    fine = alike(fit, 0, cause_of(law, law.form("fine_spline"), {"reach": 2.5}))
+    depth = np.linspace(0.1, 2.5, 50)
+    found, anew = (c.form.amend(pad, c.start).law.force(depth) for c in (coarse, fine))
+    np.testing.assert_allclose(anew, found, atol=0.01 * found.max())
+
+
+def test_another_shape_has_the_numbers_that_it_shares_with_the_one_found():
+    cogging = effect("cogging")
+    sine = cause_of(cogging, cogging.form("sine"), {"amplitude": 0.2, "period": 1.3, "phase": 0.4})
+    pad = Pad(Polynomial((0.0, 2.0)), Relaxation((0.2,), (1.0,)), unilateral=True)
+    structure = Structure(PadNumbers(pad, 2.5, 5.0), (sine,))
+    x = structure.x(structure.pad.x(), [sine.start])
+    fit = Fit(structure, x, 0.0, np.eye(len(x)), True)
+    slotted = alike(fit, 0, cause_of(cogging, cogging.form("slotted")))
+    assert slotted.start == pytest.approx({"amplitude": 0.2, "period": 1.3, "phase": 0.4, "steepness": 2.0})

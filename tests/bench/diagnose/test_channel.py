@@ -83,6 +83,38 @@ def test_a_ceiling_that_gives_way_is_a_ceiling(kind):
     assert recall > 0.8
 
 
+@pytest.mark.parametrize("kind", ["white", "coloured", "quantised", "heavy"])
+def test_below_a_ceiling_that_is_not_sharp_the_force_is_not_trusted(kind):
+    """From where the force is bent by 1 % of the ceiling on; below a sharp one all but little is."""
+    said, true = [], []
+    for seed in (1, 2, 3, 4):
+        told = {"noise_kind": kind, "own_clock": False, "rate_hz": 400.0}
+        sharp = draw_case(seed, ("saturation",), 1.5, "hard", **told)
+        assert np.mean(faults(sharp.force_N).bent) < 0.08
+        case = draw_case(seed, ("saturation",), 1.5, "soft", **told)
+        found, limit = faults(case.force_N), case.truth.parameters["saturation"]["limit"]
+        bends = (case.force_N > 0.96 * limit) & ~case.truth.flags["saturated"]
+        assert np.mean(found.good[bends]) < 0.05
+        assert np.mean(found.good[case.force_N < 0.85 * limit]) > 0.99
+        said.append(found.saturated)
+        true.append(case.truth.flags["saturated"])
+    precision, recall = _scored(np.concatenate(said), np.concatenate(true))
+    assert precision > 0.95
+    assert recall > 0.75
+
+
+def test_a_run_of_one_value_near_the_greatest_force_sticks_and_is_no_ceiling():
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        force = _steps(rng, 1e-7, 0.01)
+        top = int(np.argmax(force))
+        force[top + 20 : top + 24] = force[top + 20] - 1e-5 * np.arange(4)  # calm by chance
+        force[top + 23 : top + 41] = force[top + 23]
+        found = faults(force)
+        assert not found.saturated.any()
+        assert found.stuck[top + 24 : top + 41].all()
+
+
 def test_a_frame_that_is_lost_twice_in_a_row_is_stray_and_not_stuck():
     for seed in (1, 2, 3):
         case = draw_case(seed, ("outliers",), 2.0, "dropouts", noise_kind="white", own_clock=False)

@@ -1,0 +1,40 @@
+"""Which of the causes found is taken away again, as what was held out tells."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+module = importlib.import_module("bench.diagnose.diagnose")
+
+
+def needless(monkeypatch: pytest.MonkeyPatch, squares: Sequence[float], left_out: Sequence[float]) -> int | None:
+    """Number of the needless cause: `squares`, with none, one … all causes; `left_out`, without each but the last.
+    The noise's own square is 1."""
+    fits: list[Any] = [
+        SimpleNamespace(structure=SimpleNamespace(causes=(None,) * k), number=k) for k in range(len(squares))
+    ]
+    monkeypatch.setattr(module, "without", lambda prepared, fit, index: index)
+    monkeypatch.setattr(module, "held_out_square", lambda prepared, index: left_out[index])
+    monkeypatch.setattr(module, "later_square", lambda prepared, fit: 1.0)
+    prepared: Any = SimpleNamespace(floor_N=1.0, floor_square_std=0.01)
+    return module._needless(prepared, fits, list(squares), [max(s - 1.0, 0.0) for s in squares], 0.0)
+
+
+def test_of_two_that_hide_each_other_neither_is_needless(monkeypatch):
+    assert needless(monkeypatch, [4.0, 4.1, 1.0], [3.9]) is None
+    assert needless(monkeypatch, [4.0, 3.99, 1.0], [3.9]) is None
+
+
+def test_one_that_the_others_have_made_needless_goes(monkeypatch):
+    assert needless(monkeypatch, [4.0, 4.1, 1.0, 1.01], [3.9, 3.0]) == 2
+    assert needless(monkeypatch, [4.0, 4.1, 1.0], [1.0]) == 0
+
+
+def test_one_that_takes_a_crumb_goes_and_one_that_takes_most_of_what_is_left_stays(monkeypatch):
+    assert needless(monkeypatch, [400.0, 3.0, 2.5], []) == 1
+    assert needless(monkeypatch, [400.0, 3.0, 1.1], []) is None
