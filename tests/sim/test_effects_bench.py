@@ -123,7 +123,9 @@ class TestFriction:
 
 class TestOtherFrames:
     @pytest.mark.parametrize(
-        ("form", "shape"), [("stiffening", [4.0]), ("power", [2 / 3]), ("joint", [3.0, 0.3])], ids=lambda v: str(v)
+        ("form", "shape"),
+        [("stiffening", [4.0]), ("power", [2 / 3]), ("joint", [3.0, 0.3, 0.1]), ("closing", [3.0, 2.5, 0.1])],
+        ids=lambda v: str(v),
     )
     def test_the_compliance_is_the_secant_at_its_force(self, form: str, shape: list[float]) -> None:
         block = active("frame_compliance", form).form.blocks["frame"]
@@ -145,13 +147,18 @@ class TestOtherFrames:
         large = [block(0.0, f, [], [0.01, 2 / 3, 5.0]) for f in (1e3, 8e3)]
         assert_allclose(large[1] / large[0], 4.0, rtol=1e-5)
 
-    def test_a_joint_is_stiff_until_it_opens(self) -> None:
-        block = active("frame_compliance", "joint").form.blocks["frame"]
-        slopes = [(block(0.0, f + 1e-4, [], [0.02, 2.0, 0.3, 5.0]) - block(0.0, f, [], [0.02, 2.0, 0.3, 5.0])) / 1e-4
-                  for f in (0.0, 40.0)]  # fmt: skip
-        assert_allclose(slopes[0] / slopes[1], 0.3, rtol=1e-3)
+    @pytest.mark.parametrize(("form", "before_over_after"), [("joint", 0.3), ("closing", 2.5)])
+    def test_a_joint_is_two_straight_lines_that_meet_at_its_force(self, form: str, before_over_after: float) -> None:
+        block = active("frame_compliance", form).form.blocks["frame"]
 
-    @pytest.mark.parametrize("form", ["stiffening", "power", "joint"])
+        def deflection(force: float) -> float:
+            return block(0.0, force, [], [0.02, 2.0, before_over_after, 0.05, 5.0])
+
+        before, after = deflection(0.5) / 0.5, (deflection(40.0) - deflection(20.0)) / 20.0
+        assert_allclose(before / after, before_over_after, rtol=0.01)
+        assert_allclose(deflection(20.0) - after * 18.0, before * 2.0, rtol=0.01)  # the lines meet at 2 N
+
+    @pytest.mark.parametrize("form", ["stiffening", "power", "joint", "closing"])
     def test_the_frame_is_solved_with_the_pad(self, form: str) -> None:
         frame = active("frame_compliance", form, compliance=0.05)
         t, x = walk(300)

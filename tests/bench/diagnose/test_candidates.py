@@ -39,3 +39,13 @@ def test_delay_lag_and_resonance_are_as_late_as_they_say(id_):
             spring = Pad(Polynomial((0.0, 1.0)), Relaxation(), unilateral=False)
             late = Cascade(spring, [Active(effect(id_), effect(id_).forms[0], values)])
             assert time[-1] - late.simulate(time, time)[-1] == pytest.approx(late_s, rel=0.02)
+
+
+@pytest.mark.parametrize("force_N", [0.5, 50.0])
+def test_a_joint_opens_or_closes_within_the_forces_that_were_met(force_N):
+    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=3.0, depth_mm=2.5, force_N=force_N)
+    for form in ("joint", "closing"):
+        preload = next(
+            p for p in narrowed(effect("frame_compliance").form(form), reach).parameters if p.name == "preload"
+        )
+        assert 0 < preload.lower < min(preload.starts) < max(preload.starts) < preload.upper <= force_N
