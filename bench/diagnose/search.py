@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
 AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
+NEAR = 2.0  # times χ² before: another law that is no farther off after a few steps takes more
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
 WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
@@ -229,7 +230,9 @@ class Search:
                 forms_seen[s.cause.form.name] = seen + 1
                 chosen.append(s)
         joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen]
-        tried = [t for t in joined if t is not None]
+        # another law begins beside the fit and not at it: it takes more steps to tell what it is worth
+        near = [t is not None and t.cause.form.amend is not None and t.fit.chi2 < NEAR * fit.chi2 for t in joined]
+        tried = [self._carried(t, MORE) if close else t for t, close in zip(joined, near, strict=True) if t is not None]
         tried += self._from_believed(tried, *believed)
         return sorted(tried, key=lambda t: t.score)
 
