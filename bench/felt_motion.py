@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 REACHES = np.array([2, 3, 4, 6, 8, 11, 15, 21, 29, 40, 56, 80, 112, 160], dtype=np.int64)
 """Half-widths of the windows, in samples."""
 SHORTEST, EDGE = 30, 4  # samples of a hold that can show it to be at rest; samples at its ends that may still move
+LIKELY, CHANCE = 4.0, 5.0  # standard deviations: levels nearer are one, samples farther off are no noise
 BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
 TOGETHER = 20  # samples that share the error of a window, about
 WIDTH = 2.2  # standard deviations on either side of a value
@@ -167,22 +168,74 @@ def _rested(
     # a coarse scale hops between two levels, and neither says which of them is nearer
     hop = resolution(position_mm) if coarse else 0.0
     noise_mm = max(noise_mm, 0.5 * hop)
-    still = np.abs(np.diff(clean_mm)) <= max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)), 0.6 * hop)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8))).reshape(-1, 2)
-    for number, (a, b) in enumerate(edges.tolist(), 1):
+    quiet_mm = max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)), 0.6 * hop)
+    for number, (a, b) in enumerate(_rests(position_mm, clean_mm, noise_mm, quiet_mm), 1):
         inside = position_mm[a + EDGE : b + 1 - EDGE]
         n = len(inside)
         if n < SHORTEST:
             continue
         level = float(inside.mean())
         halves = abs(float(inside[: n // 2].mean() - inside[n // 2 :].mean())) / (2.0 * noise_mm / np.sqrt(n))
-        if float(np.sum((inside - level) ** 2)) <= noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n)) and halves < 4.0:
+        if float(np.sum((inside - level) ** 2)) <= noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n)) and halves < LIKELY:
+            ahead, behind = position_mm[b + 1 : b + 1 + SHORTEST], position_mm[max(a - SHORTEST, 0) : a][::-1]
+            a, b = a - _staying((behind - level) / noise_mm), b + _staying((ahead - level) / noise_mm)
             clean[a : b + 1] = level
             std[a : b + 1] = noise_mm / np.sqrt(n)
             # a coarse scale is off by as much whenever the same level is held
             again = reached.setdefault(float(np.median(inside)), number) if coarse else number
             hold[a : b + 1] = again
     return clean, std, hold
+
+
+def _staying(off: Array) -> int:
+    """How many of the samples after a rest belong to it still; `off`: from its level, in standard deviations."""
+    strays = np.maximum(np.abs(off), np.abs(np.cumsum(off)) / np.sqrt(np.arange(1, len(off) + 1))) > LIKELY
+    return max(int(np.argmax(strays)) - EDGE, 0) if strays.any() else len(off)
+
+
+def _between(hold: NDArray[np.intp], first: int, last: int) -> list[slice]:
+    """The samples before and after a move that lie between it and a rest near by."""
+    before = np.flatnonzero(hold[max(first - SHORTEST, 0) : first][::-1])
+    after = np.flatnonzero(hold[last + 1 : last + 1 + SHORTEST])
+    out = [slice(first - int(before[0]), first)] if len(before) else []
+    return [*out, slice(last + 1, last + 1 + int(after[0]))] if len(after) else out
+
+
+def _rests(position_mm: Array, clean_mm: Array, noise_mm: float, quiet_mm: float) -> list[tuple[int, int]]:
+    """Runs of samples (first, last), not the shortest, that differ by less than `quiet_mm` from one to the next.
+
+    Some samples in a thousand are noise that no window of neighbours agrees with, and a mass would feel them as blows:
+    a few between two rests at one level are of that rest, where chance can have thrown them.
+    """
+    still = np.abs(np.diff(clean_mm)) <= quiet_mm
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8))).reshape(-1, 2)
+    total = np.concatenate([[0.0], np.cumsum(position_mm - position_mm[0])])
+    out: list[tuple[int, int]] = []
+    for a, b in edges[edges[:, 1] - edges[:, 0] > 2 * EDGE].tolist():
+        if out and _one_rest(position_mm - position_mm[0], total, out[-1], (a, b), noise_mm):
+            out[-1] = out[-1][0], b
+        else:
+            out.append((a, b))
+    return out
+
+
+def _one_rest(
+    position_mm: Array, total: Array, before: tuple[int, int], after: tuple[int, int], noise_mm: float
+) -> bool:
+    """Whether two runs, and what is between them, are samples of one level; `total`: running sums of the positions."""
+    (a, b), (c, d) = before, after
+    n, m, between = b - a + 1 - 2 * EDGE, d - c + 1 - 2 * EDGE, c - b - 1
+    if between >= SHORTEST:
+        return False
+    level, other = (total[b + 1 - EDGE] - total[a + EDGE]) / n, (total[d + 1 - EDGE] - total[c + EDGE]) / m
+    if abs(level - other) > LIKELY * noise_mm * np.sqrt(1.0 / n + 1.0 / m):
+        return False
+    return _by_chance((position_mm[b + 1 : c] - (n * level + m * other) / (n + m)) / noise_mm)
+
+
+def _by_chance(off: Array) -> bool:
+    """Whether noise may be all of some errors, in its standard deviations: each of them, and their mean."""
+    return bool(np.all(np.abs(off) <= CHANCE) and abs(float(off.sum())) <= CHANCE * np.sqrt(len(off)))
 
 
 def felt(time_s: Array, position_mm: Array) -> Felt:
@@ -200,10 +253,14 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
         step, coarse = resolution(position_mm), _coarse(position_mm)
         clean, std, hold = _rested(position_mm, clean, std, noise, left)
         stretch = np.where(hold > 0, hold, stretch)
-        planned = planned_moves(time_s, position_mm, clean, noise, left)
+        planned = planned_moves(time_s, position_mm, clean, noise, left, hold > 0)
         for (first, last), move in planned.items():
             inside = slice(first, last + 1)
             clean[inside] = move.position(time_s[inside])
+            for rest in _between(hold, first, last):  # what is left between the move and the rest beside it
+                level = move.position(time_s[rest])
+                if _by_chance((position_mm[rest] - level) / noise):
+                    clean[rest] = level
             at_ends = max(float(std[first]), float(std[last]), 0.7 * coarse)
             std[inside] = max(2.0 * noise / np.sqrt(last - first + 1), at_ends)
             stretch[inside] = 1 + len(clean) + first

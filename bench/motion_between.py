@@ -29,6 +29,8 @@ SCAN = np.geomspace(100.0, 1e6, 25)  # of accelerations, in reaches/s²
 GENTLE = 0.01  # what a doubled acceleration costs, in squares of the slack and a move
 SLACK = 1e-3  # of the way: what a trapezoid may miss a sample by
 LEAST = 3  # samples of a move that can show it to be a trapezoid
+NEAR = 30  # samples between a move and a rest, whose first and last ones may be told late
+PAUSE = 2  # intervals that are no rest where the motion hardly slows down
 AGREED = 5.0  # standard deviations of χ² within which it is one
 
 
@@ -71,20 +73,28 @@ Moves = dict[tuple[int, int], "Trapezoid"]
 """By (sample before, sample after)."""
 
 
-def planned_moves(time_s: Array, position_mm: Array, clean_mm: Array, noise_mm: float, left_mm: float) -> Moves:
+def planned_moves(
+    time_s: Array,
+    position_mm: Array,
+    clean_mm: Array,
+    noise_mm: float,
+    left_mm: float,
+    resting: NDArray[np.bool_] | None = None,
+) -> Moves:
     """Moves whose noisy positions (n,) are those of a trapezoid and nothing else, within the noise of the samples.
 
-    `clean_mm` (n,): the same positions smoothed, with noise `left_mm`: they tell where moves begin and end.
+    `clean_mm` (n,): the same positions smoothed, with noise `left_mm`: they tell where moves begin and end. `resting`
+    (n,): where they are means over a long rest; a move begins and ends at such a level where one is near.
     """
     reach = float(np.ptp(clean_mm))
     if len(time_s) < 5 or not reach > 0:
         return {}
     out: Moves = {}
     for quiet_mm in (left_mm, noise_mm):  # what is left beside a move may hide that it begins at rest
-        moving, _ = _moving(clean_mm, reach, quiet_mm)
+        moving = _carried_on(_moving(clean_mm, reach, quiet_mm)[0], clean_mm)
         groups = [(a, b) for a, b in _grouped(moving, moving) if b - a >= LEAST]
         if groups:
-            found = _trapezoids(time_s, clean_mm, moving, groups, reach, noise_mm, position_mm)
+            found = _trapezoids(time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, resting=resting)
             told = _told(found, time_s, position_mm, noise_mm)
             out |= {k: v for k, v in told.items() if not any(k[0] < o[1] and o[0] < k[1] for o in out)}
     return _apart(out)
@@ -121,6 +131,17 @@ def _moving(position_mm: Array, reach: float, noise_mm: float) -> tuple[NDArray[
     moving = steps > max(6 * noise_mm, 1e-5 * reach)
     needed = moving & (steps > max(STEP / 2 * reach, 12 * noise_mm))
     return moving, _grouped(moving, needed)
+
+
+def _carried_on(moving: NDArray[np.bool_], position_mm: Array) -> NDArray[np.bool_]:
+    """The same, with short intervals too that are no rest: the way goes on there at no less than half the speed."""
+    out, steps = moving.copy(), np.diff(position_mm)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], ~moving, [False]]).astype(np.int8))).reshape(-1, 2)
+    for a, b in edges[edges[:, 1] - edges[:, 0] <= PAUSE].tolist():
+        beside = steps[[max(a - 1, 0), min(b, len(steps) - 1)]]
+        if np.all(steps[a:b] * beside[0] > 0.5 * np.abs(beside[0]) * np.abs(beside).min()) and beside.prod() > 0:
+            out[a:b] = True
+    return out
 
 
 def _grouped(moving: NDArray[np.bool_], needed: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -191,13 +212,17 @@ def _trapezoids(
     noise: float | Array,
     fitted: Array | None = None,
     most: int = INSIDE,
+    resting: NDArray[np.bool_] | None = None,
 ) -> Moves:
     """The groups that are trapezoids, within what the samples tell; `fitted`: samples to fit instead of x, `most` of a
-    move. `noise`: of all of them, or of each of the groups, which begin and end at rest then."""
+    move. `noise`: of all of them, or of each of the groups, which begin and end at rest then. `resting`: where x is the
+    level of a rest."""
     rest = [g for g in groups if _from_rest(moving, x, g)]
     if not rest:
         return {}
     starts, ends = _levels(x, moving, rest)
+    if resting is not None:
+        starts, ends = _of_rests(x, resting, rest, starts, ends, 4 * noise)
     moves = _moves(t, x, rest, starts, ends, x if fitted is None else fitted, most)
     allowed = np.maximum(4 * noise, SLACK * moves.way)
     told = moves.count >= 2
@@ -267,6 +292,21 @@ def _levels(x: Array, moving: NDArray[np.bool_], groups: list[tuple[int, int]]) 
             b += 1
         start[k], end[k] = float(np.mean(x[a : first + 1])), float(np.mean(x[last : b + 1]))
     return start, end
+
+
+def _of_rests(
+    x: Array, resting: NDArray[np.bool_], groups: list[tuple[int, int]], starts: Array, ends: Array, near: float | Array
+) -> tuple[Array, Array]:
+    """The levels where moves start and end; where a rest is near in time and within `near`, its own."""
+    at = np.flatnonzero(resting)
+    if not len(at):
+        return starts, ends
+    firsts, lasts = np.array([g[0] for g in groups]), np.array([g[1] for g in groups])
+    before = at[np.clip(np.searchsorted(at, firsts, side="right") - 1, 0, None)]
+    after = at[np.clip(np.searchsorted(at, lasts), None, len(at) - 1)]
+    begins = (np.abs(firsts - before) <= NEAR) & (np.abs(x[before] - starts) <= near)
+    stops = (np.abs(after - lasts) <= NEAR) & (np.abs(x[after] - ends) <= near)
+    return np.where(begins, x[before], starts), np.where(stops, x[after], ends)
 
 
 def _moves(

@@ -91,6 +91,9 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         default = 0.6 * reach.force_N
     elif p.name == "limit" and p.unit == "N":
         starts = tuple(share * reach.force_N for share in (0.6, 0.8, 0.93, 0.985))
+    elif p.name == "preload":  # a joint that opens beyond all forces is none
+        lower, upper = 0.02 * reach.force_N, reach.force_N
+        starts = tuple(share * reach.force_N for share in (0.15, 0.3, 0.6))
     if lower >= upper:
         return p
     starts = tuple(v for v in starts if lower <= v <= upper)

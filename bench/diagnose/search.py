@@ -30,6 +30,9 @@ FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
 FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the least
 HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
+AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
+NEAR = 2.0  # times χ² before: another law that is no farther off after a few steps takes more
+ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
 WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
@@ -150,7 +153,11 @@ class Search:
             )
             order = sorted((i for i in promising if sieved[i]), key=lambda i: sieved[i][0].score)
             second = _worth(fit, [sieved[i] for i in order], SECOND)
-            wide = list(pool.map(lambda i: self._widened(fit, sieved[i], family[i]), order[:second]))
+            wide = list(
+                pool.map(
+                    lambda i: self._widened(fit, sieved[i], by_id[i], family[i], signatures.jacobian), order[:second]
+                )
+            )
             wide.sort(key=lambda trials: trials[0].score)
             third = _worth(fit, wide, THIRD)
             self.progress(f"closer: {', '.join(trials[0].id for trials in wide[:third])}")
@@ -228,12 +235,18 @@ class Search:
                 forms_seen[s.cause.form.name] = seen + 1
                 chosen.append(s)
         joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen]
-        tried = [t for t in joined if t is not None]
+        # another law begins beside the fit and not at it: it takes more steps to tell what it is worth
+        near = [t is not None and t.cause.form.amend is not None and t.fit.chi2 < NEAR * fit.chi2 for t in joined]
+        tried = [self._carried(t, MORE) if close else t for t, close in zip(joined, near, strict=True) if t is not None]
         tried += self._from_believed(tried, *believed)
         return sorted(tried, key=lambda t: t.score)
 
-    def _widened(self, fit: Fit, trials: list[Trial], family: list[Form]) -> list[Trial]:
-        """More steps for the best, and the other forms of the family from where it ended."""
+    def _widened(
+        self, fit: Fit, trials: list[Trial], found: list[Start], family: list[Form], known: Array
+    ) -> list[Trial]:
+        """More steps for the best, and for the other forms of the family: each from where it ended, or from its own
+        most promising start, whichever leads further in a few steps.
+        """
         best = self._carried(trials[0], MORE)
         out = [best, *trials[1:2]]
         usual = next((t for t in trials if _usual(t) and t is not trials[0]), None)
@@ -252,10 +265,33 @@ class Search:
             pad = best.fit.x[: len(structure.pad.coordinates)]
             before = best.fit.structure.values(best.fit.x)[:-1]
             x = structure.x(pad, [*before, cause.start], best.fit.of_run)
-            trial = self._solved(structure, x, MORE, None)
-            if trial is not None:
-                out.append(trial)
+            begun = self._solved(structure, x, FEW, None)
+            own = self._of_its_own(fit, form, trials, found, known)
+            if own is not None and (begun is None or own.score < begun.score):
+                out.append(self._falling(own))
+            elif begun is not None:
+                out.append(self._carried(begun, MORE))
         return sorted(out, key=lambda t: t.score)
+
+    def _of_its_own(self, fit: Fit, form: Form, trials: list[Trial], found: list[Start], known: Array) -> Trial | None:
+        """A few steps of a form from its own best start, taken from the sieve if they are done; None: a poor start."""
+        done = [t for t in trials if t.cause.form.name == form.name]
+        if done:
+            return min(done, key=lambda t: t.score)
+        own = [s for s in found if s.cause.form.name == form.name and np.isfinite(s.promise)]
+        best = max(own, key=lambda s: s.promise, default=None)
+        if best is None or best.promise < AS_GOOD * max(s.promise for s in found):
+            return None
+        return self._joined(fit, best.cause, FEW, known)
+
+    def _falling(self, trial: Trial) -> Trial:
+        """More steps, and again while they take much: a form from its own start has a longer way than from another's
+        end."""
+        for _ in range(ROUNDS):
+            before, trial = trial.fit.chi2, self._carried(trial, MORE)
+            if before - trial.fit.chi2 < MUCH * before:
+                break
+        return trial
 
     def _plainest(self, trials: list[Trial]) -> Trial:
         """The best; or a form of fewer numbers that is as good for what there is to explain."""

@@ -9,9 +9,11 @@ of K. The force used is the one at the cell, solved within the step (sim/kernel.
 - `stiffening`: C F (1 + F_0/F_s)/(1 + |F|/F_s): joints that bed in under load.
 - `power`: C F ((1 + (F/1 N)²)/(1 + (F_0/1 N)²))^((n−1)/2): linear at small forces and |F|^n at large ones. Hertz's
   contact of probe and seat has n = 2/3 (K. L. Johnson, Contact Mechanics, Cambridge, 1985, chapter 4).
-- `joint`: stiffer by the factor k below the preload P of a joint, which then opens: in proportion to
-  F − (1 − k) P (1 − e^(−|F|/P)) sgn F (J. H. Bickford, Introduction to the Design and Behavior of Bolted Joints, 4th
-  ed., CRC, 2008).
+- `joint`: the joint diagram, two straight lines that meet at a force P: a joint under preload is stiff until it opens,
+  k < 1 times as compliant below P as beyond. In proportion to (|F| − (1 − k) m(|F|)) sgn F with m the lesser of |F| and
+  P, rounded over r P since faces part bit by bit: m(F) = (F + √(P² + (r P)²) − √((F − P)² + (r P)²))/2 (J. H. Bickford,
+  Introduction to the Design and Behavior of Bolted Joints, 4th ed., CRC, 2008).
+- `closing`: the same with k > 1: faces that are not yet home are soft until P has closed the joint.
 
 Reference: W. C. Oliver, G. M. Pharr, J. Mater. Res. 7, 1992, 1564–1583: the compliance measured is that of the
 contact plus that of the load frame.
@@ -45,16 +47,25 @@ def power(dt: float, force: float, state: State, p: State) -> float:
 
 @block
 def joint(dt: float, force: float, state: State, p: State) -> float:
-    """Deflection in mm; p = (compliance, preload, stiff_share, at_force)."""
-    held = (1.0 - p[2]) * p[1]
-    opened = abs(force) + held * math.expm1(-abs(force) / p[1])
-    return p[0] * p[3] * math.copysign(opened, force) / (p[3] + held * math.expm1(-p[3] / p[1]))
+    """Deflection in mm; p = (compliance, preload, stiff_share, rounding, at_force)."""
+    wide = p[3] * p[1]
+    rest = math.sqrt(p[1] * p[1] + wide * wide)
+    size = abs(force)
+    below = 0.5 * (size + rest - math.sqrt((size - p[1]) * (size - p[1]) + wide * wide))
+    below_at = 0.5 * (p[4] + rest - math.sqrt((p[4] - p[1]) * (p[4] - p[1]) + wide * wide))
+    opened = math.copysign(size - (1.0 - p[2]) * below, force)
+    return p[0] * p[4] * opened / (p[4] - (1.0 - p[2]) * below_at)
 
 
 def _compliance(what: str) -> Parameter:
     return Parameter("compliance", "mm/N", 0.0, 1.0, 0.005, what, required=True, amplitude=True, starts=(0.005, 0.03))
 
 
+def _preload(what: str) -> Parameter:
+    return Parameter("preload", "N", 1e-2, 1e4, 2.0, what, starts=(2.0,))
+
+
+_ROUNDING = Parameter("rounding", "1", 0.01, 2.0, 0.1, "width of the bend over the preload", fixed=True)
 _AT_FORCE = Parameter("at_force", "N", 1e-3, 1e6, 5.0, "force at which the compliance holds", fixed=True)
 
 EFFECT = Effect(
@@ -97,8 +108,21 @@ EFFECT = Effect(
             what="softer where a joint opens",
             parameters=(
                 _compliance("deflection per newton at `at_force`"),
-                Parameter("preload", "N", 1e-2, 1e4, 2.0, "force at which the joint opens", starts=(0.5, 2.0, 8.0)),
+                _preload("force at which the joint opens"),
                 Parameter("stiff_share", "1", 0.0, 1.0, 0.4, "compliance before over that after", starts=(0.2, 0.5)),
+                _ROUNDING,
+                _AT_FORCE,
+            ),
+            blocks={"frame": joint},
+        ),
+        Form(
+            name="closing",
+            what="stiffer where a joint has closed",
+            parameters=(
+                _compliance("deflection per newton at `at_force`"),
+                _preload("force at which the joint has closed"),
+                Parameter("soft_ratio", "1", 1.0, 10.0, 2.5, "compliance before over that after", starts=(2.5,)),
+                _ROUNDING,
                 _AT_FORCE,
             ),
             blocks={"frame": joint},

@@ -8,13 +8,17 @@
 - `damped`: mass · (acceleration + damping_rate · speed), a mass in oil or with a cable dragging.
 - `growing`: a mass m that goes with the place, as of a cable chain that lays itself down: m a + m' v²/2, which is the
   momentum's rate and what Lagrange's equation gives. `mass` is that at `at_depth`.
-- `sprung`: the mass sits on a spring and damper of its own: natural frequency and damping ratio. Exact for an
-  acceleration that is constant over each step, and brings the speed of the last step to that of this one.
+- `sprung`: the mass sits on a spring and damper of its own: natural frequency and damping ratio. A cell behind them
+  reads the force of both; one that is itself the spring reads its deflection alone (`damping_felt` 0). Exact for an
+  acceleration that is constant over some steps, at any spacing: the mean speed of a step is that at its middle, from
+  which the acceleration is carried on to its end. A step many times as long as the one beside it moves at its mean
+  speed but for a short time next to that one.
 - `hung`: a share of the mass is sprung, the rest rigid: a cable or hose on a carriage.
 
 `mass` in kg, positions in mm: the force is mass/1000 · mm/s².
 
-Reference: L. Meirovitch, Fundamentals of Vibrations, McGraw-Hill, 2001 (rigid and sprung mass under base motion).
+Reference: L. Meirovitch, Fundamentals of Vibrations, McGraw-Hill, 2001 (rigid and sprung mass under base motion); E. O.
+Doebelin, Measurement Systems, 4th ed., McGraw-Hill, 1990, chapter 4 (a mass on a spring whose deflection is read).
 """
 
 from __future__ import annotations
@@ -24,21 +28,44 @@ from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.linear import swing
-from sim.jit import State, block
+from sim.jit import State, block, compiled
 
 _STARTED = 0
 _AGES = 1
 _PLACES = 5
 _KNOTS = 4
-_HUNG = 9  # y, its speed, deflection and its speed
+_HUNG = 9  # y, speed of the step and its length, then as of `ridden`
+_LONGER = 2.0  # times the step beside it: for so long at the most a speed changes
 _APART = 0.7
 _KG_MM = 1e-3
 """N per kg mm/s²."""
 
 
+@compiled("UniTuple(float64, 5)(float64, float64, float64, float64, float64, float64, float64, float64)")
+def ridden(
+    dt: float, dt_before: float, change: float, since: float, e: float, de: float, omega: float, damping: float
+) -> tuple[float, float, float, float, float]:
+    """Deflection of a spring under what rides on it, over a step that is faster by `change` (mm/s) than the one before.
+
+    `e`, `de`: deflection and its speed, `since` before the step begins. Returns the same for the next step (since, e,
+    de), and e and de at this one's end.
+    """
+    earlier = min(0.5 * dt_before, _LONGER * dt)
+    later = 0.5 * dt if dt_before <= 0.0 else min(0.5 * dt, _LONGER * dt_before)
+    e, de = swing(since - earlier, e, de, omega, damping)
+    rest = -change / ((earlier + later) * omega * omega)  # deflection under the acceleration
+    e, de = swing(earlier + later, e - rest, de, omega, damping)
+    e += rest
+    if later < 0.5 * dt:  # the speed has changed, and stays
+        rest = 0.0
+    e_now, de_now = swing(dt - later, e - rest, de, omega, damping)
+    return dt - later, e, de, rest + e_now, de_now
+
+
 @block
 def rigid(dt: float, y: float, state: State, p: State) -> float:
-    """Force on the mass in N; p = (mass, damping_rate, window, lead, growth, at_depth, hung, frequency, damping_ratio).
+    """Force on the mass in N; p = (mass, damping_rate, window, lead, growth, at_depth, hung, frequency, damping_ratio,
+    damping_felt).
 
     State: the last four knots, newest first: time since each, and position there; then that of the part that is hung.
     """
@@ -49,13 +76,19 @@ def rigid(dt: float, y: float, state: State, p: State) -> float:
         omega = 2.0 * math.pi * p[7]
         if dt > 0.0:
             step_speed = (y - state[_HUNG]) / dt
-            rest = (state[_HUNG + 1] - step_speed) / (dt * omega * omega)
-            e, de = swing(dt, state[_HUNG + 2] - rest, state[_HUNG + 3], omega, p[8])
+            change = step_speed - state[_HUNG + 1]
+            since, e, de, e_now, de_now = ridden(
+                dt, state[_HUNG + 2], change, state[_HUNG + 3], state[_HUNG + 4], state[_HUNG + 5], omega, p[8]
+            )
             state[_HUNG] = y
             state[_HUNG + 1] = step_speed
-            state[_HUNG + 2] = rest + e
-            state[_HUNG + 3] = de
-        hanging = -p[6] * (omega * omega * state[_HUNG + 2] + 2.0 * p[8] * omega * state[_HUNG + 3])
+            state[_HUNG + 2] = dt
+            state[_HUNG + 3] = since
+            state[_HUNG + 4] = e
+            state[_HUNG + 5] = de
+            state[_HUNG + 6] = e_now
+            state[_HUNG + 7] = de_now
+        hanging = -p[6] * (omega * omega * state[_HUNG + 6] + 2.0 * p[9] * p[8] * omega * state[_HUNG + 7])
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
         for i in range(_KNOTS):  # at rest before the data
@@ -86,9 +119,9 @@ def rigid(dt: float, y: float, state: State, p: State) -> float:
 
 @block
 def sprung(dt: float, y: float, state: State, p: State) -> float:
-    """Force of spring and damper on the mass in N; p = (mass, frequency, damping_ratio).
+    """Force of spring and damper on the mass in N; p = (mass, frequency, damping_ratio, damping_felt).
 
-    State: started, y, speed of y, deflection and its speed.
+    State: started, y, speed of the step and its length, then as of `ridden`: since, e, de, e and de at the end.
     """
     if state[0] == 0.0:
         state[0] = 1.0
@@ -96,13 +129,16 @@ def sprung(dt: float, y: float, state: State, p: State) -> float:
     omega = 2.0 * math.pi * p[1]
     if dt > 0.0:
         speed = (y - state[1]) / dt
-        rest = (state[2] - speed) / (dt * omega * omega)  # deflection under the acceleration of this step
-        e, de = swing(dt, state[3] - rest, state[4], omega, p[2])
+        since, e, de, e_now, de_now = ridden(dt, state[3], speed - state[2], state[4], state[5], state[6], omega, p[2])
         state[1] = y
         state[2] = speed
-        state[3] = rest + e
-        state[4] = de
-    return -_KG_MM * p[0] * (omega * omega * state[3] + 2.0 * p[2] * omega * state[4])
+        state[3] = dt
+        state[4] = since
+        state[5] = e
+        state[6] = de
+        state[7] = e_now
+        state[8] = de_now
+    return -_KG_MM * p[0] * (omega * omega * state[7] + 2.0 * p[3] * p[2] * omega * state[8])
 
 
 _MASS = Parameter("mass", "kg", 0.0, 50.0, 0.1, "mass beyond the cell", required=True, amplitude=True)
@@ -116,10 +152,19 @@ _FREQUENCY = Parameter("frequency", "Hz", 1.0, 2000.0, 80.0, "natural frequency"
 _DAMPING = Parameter("damping_ratio", "1", 1e-3, 0.95, 0.3, "damping over critical damping", starts=(0.05, 0.5))
 
 
+_FELT = Parameter("damping_felt", "1", 0.0, 1.0, 1.0, "share of the damper's force that the cell reads", starts=(0.5,))
+
+
 def _packed(values: Mapping[str, float]) -> tuple[float, ...]:
     names = ("damping_rate", "window", "lead", "growth", "at_depth", "share")
     given = (values.get(name, 0.0) for name in names)
-    return (values["mass"], *given, values.get("frequency", 1.0), values.get("damping_ratio", 0.5))
+    return (
+        values["mass"],
+        *given,
+        values.get("frequency", 1.0),
+        values.get("damping_ratio", 0.5),
+        values.get("damping_felt", 1.0),
+    )
 
 
 EFFECT = Effect(
@@ -134,7 +179,7 @@ EFFECT = Effect(
             what="mass times acceleration",
             parameters=(_MASS, _WINDOW, _LEAD),
             blocks={"probe": rigid},
-            state=(0.0,) * 13,
+            state=(0.0,) * 17,
             pack=_packed,
         ),
         Form(
@@ -147,15 +192,15 @@ EFFECT = Effect(
                 _LEAD,
             ),
             blocks={"probe": rigid},
-            state=(0.0,) * 13,
+            state=(0.0,) * 17,
             pack=_packed,
         ),
         Form(
             name="sprung",
             what="the mass swings on a spring of its own",
-            parameters=(_MASS, _FREQUENCY, _DAMPING),
+            parameters=(_MASS, _FREQUENCY, _DAMPING, _FELT),
             blocks={"probe": sprung},
-            state=(0.0,) * 5,
+            state=(0.0,) * 9,
         ),
         Form(
             name="growing",
@@ -169,7 +214,7 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": rigid},
-            state=(0.0,) * 13,
+            state=(0.0,) * 17,
             pack=_packed,
         ),
         Form(
@@ -180,12 +225,13 @@ EFFECT = Effect(
                 Parameter("share", "1", 0.0, 1.0, 0.4, "share of the mass that swings"),
                 _FREQUENCY,
                 _DAMPING,
+                _FELT,
                 _WINDOW,
                 _LEAD,
             ),
             sought=False,
             blocks={"probe": rigid},
-            state=(0.0,) * 13,
+            state=(0.0,) * 17,
             pack=_packed,
         ),
     ),

@@ -7,6 +7,9 @@ value. Each is exact for a force that is linear between samples, at any spacing.
 - `two_poles`: critically damped, 1/(1 + τs/2)².
 - `butterworth`: second order without a peak, damping ratio 1/√2, ω = √2/τ.
 - `moving_average`: the mean over the last 2τ.
+- `decimator`: the mean over 2wτ around the time τ ago. With w = 1/√3 delay and width are those of three running means
+  in a row, as of a converter's sinc³ decimator (E. B. Hogenauer, IEEE Trans. Acoust. Speech Signal Process. 29, 1981,
+  155–162).
 
 Reference: E. O. Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3 (first
 and second order instruments and their response to a ramp).
@@ -15,6 +18,7 @@ and second order instruments and their response to a ramp).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.linear import low_pass
@@ -75,15 +79,15 @@ def butterworth(dt: float, u: float, state: State, p: State) -> float:
 
 
 # moving average: the integral of the force at knots in a ring; (age of the newest, integral, force, time) …
-_AGE, _TOTAL, _FORCE, _NOW, _FIRST, _COUNT, _TAIL = range(7)
-_RING = 7
+_AGE, _TOTAL, _FORCE, _NOW, _FIRST, _COUNT, _TAIL = range(7)  # two of the last
+_RING = 8
 KNOTS = 256
 _PER_WINDOW = 200
 
 
 @block
 def moving_average(dt: float, u: float, state: State, p: State) -> float:
-    """Mean over the last 2τ; p = (time_constant,).
+    """Mean over 2wτ, whose middle was τ ago; p = (time_constant, width).
 
     Knots (time, integral, force) stand at every sample, or where samples are closer than a 200th of the window, at
     that distance. Between knots the force is taken as linear.
@@ -109,23 +113,36 @@ def moving_average(dt: float, u: float, state: State, p: State) -> float:
         count += 1
     if width <= 0.0:
         return u
-    start = now - width
-    if start <= 0.0:  # before the data the force was the first one
-        return (state[_TOTAL] - start * state[_FIRST]) / width
-    tail = max(int(state[_TAIL]), count - KNOTS)
-    while tail + 1 < count and state[_RING + 3 * ((tail + 1) % KNOTS)] <= start:
-        tail += 1
-    state[_TAIL] = float(tail)
-    low = _RING + 3 * (tail % KNOTS)
-    if tail + 1 < count:
-        high = _RING + 3 * ((tail + 1) % KNOTS)
-        then, force = state[high], state[high + 2]
-    else:
-        then, force = now, u
-    into = start - state[low]
-    slope = (force - state[low + 2]) / (then - state[low]) if then > state[low] else 0.0
-    before = state[low + 1] + into * (state[low + 2] + 0.5 * slope * into)
-    return (state[_TOTAL] - before) / width
+    half = 0.5 * width * p[1]
+    before = after = 0.0  # integrals up to the window's begin and end
+    for end in range(2):
+        at = min(now - p[0] - half if end == 0 else now - p[0] + half, now)
+        value = state[_TOTAL]
+        if at <= 0.0:  # before the data the force was the first one
+            value = at * state[_FIRST]
+        elif at < now:
+            tail = max(int(state[_TAIL + end]), count - KNOTS)
+            while tail + 1 < count and state[_RING + 3 * ((tail + 1) % KNOTS)] <= at:
+                tail += 1
+            state[_TAIL + end] = float(tail)
+            low = _RING + 3 * (tail % KNOTS)
+            if tail + 1 < count:
+                high = _RING + 3 * ((tail + 1) % KNOTS)
+                then, force = state[high], state[high + 2]
+            else:
+                then, force = now, u
+            into = at - state[low]
+            slope = (force - state[low + 2]) / (then - state[low]) if then > state[low] else 0.0
+            value = state[low + 1] + into * (state[low + 2] + 0.5 * slope * into)
+        if end == 0:
+            before = value
+        else:
+            after = value
+    return (after - before) / (2.0 * half)
+
+
+def _whole(values: Mapping[str, float]) -> tuple[float, ...]:
+    return values["time_constant"], 1.0
 
 
 _TIME_CONSTANT = Parameter(
@@ -173,6 +190,17 @@ EFFECT = Effect(
             name="moving_average",
             what="mean over a window of twice the time constant",
             parameters=(_TIME_CONSTANT,),
+            blocks={"sensor": moving_average},
+            state=(0.0,) * (_RING + 3 * KNOTS),
+            pack=_whole,
+        ),
+        Form(
+            name="decimator",
+            what="mean over a shorter window as late, as of a converter's sinc filter",
+            parameters=(
+                _TIME_CONSTANT,
+                Parameter("width", "1", 0.1, 1.0, 3.0**-0.5, "window over twice the time constant", fixed=True),
+            ),
             blocks={"sensor": moving_average},
             state=(0.0,) * (_RING + 3 * KNOTS),
         ),

@@ -123,7 +123,9 @@ class TestFriction:
 
 class TestOtherFrames:
     @pytest.mark.parametrize(
-        ("form", "shape"), [("stiffening", [4.0]), ("power", [2 / 3]), ("joint", [3.0, 0.3])], ids=lambda v: str(v)
+        ("form", "shape"),
+        [("stiffening", [4.0]), ("power", [2 / 3]), ("joint", [3.0, 0.3, 0.1]), ("closing", [3.0, 2.5, 0.1])],
+        ids=lambda v: str(v),
     )
     def test_the_compliance_is_the_secant_at_its_force(self, form: str, shape: list[float]) -> None:
         block = active("frame_compliance", form).form.blocks["frame"]
@@ -145,13 +147,18 @@ class TestOtherFrames:
         large = [block(0.0, f, [], [0.01, 2 / 3, 5.0]) for f in (1e3, 8e3)]
         assert_allclose(large[1] / large[0], 4.0, rtol=1e-5)
 
-    def test_a_joint_is_stiff_until_it_opens(self) -> None:
-        block = active("frame_compliance", "joint").form.blocks["frame"]
-        slopes = [(block(0.0, f + 1e-4, [], [0.02, 2.0, 0.3, 5.0]) - block(0.0, f, [], [0.02, 2.0, 0.3, 5.0])) / 1e-4
-                  for f in (0.0, 40.0)]  # fmt: skip
-        assert_allclose(slopes[0] / slopes[1], 0.3, rtol=1e-3)
+    @pytest.mark.parametrize(("form", "before_over_after"), [("joint", 0.3), ("closing", 2.5)])
+    def test_a_joint_is_two_straight_lines_that_meet_at_its_force(self, form: str, before_over_after: float) -> None:
+        block = active("frame_compliance", form).form.blocks["frame"]
 
-    @pytest.mark.parametrize("form", ["stiffening", "power", "joint"])
+        def deflection(force: float) -> float:
+            return block(0.0, force, [], [0.02, 2.0, before_over_after, 0.05, 5.0])
+
+        before, after = deflection(0.5) / 0.5, (deflection(40.0) - deflection(20.0)) / 20.0
+        assert_allclose(before / after, before_over_after, rtol=0.01)
+        assert_allclose(deflection(20.0) - after * 18.0, before * 2.0, rtol=0.01)  # the lines meet at 2 N
+
+    @pytest.mark.parametrize("form", ["stiffening", "power", "joint", "closing"])
     def test_the_frame_is_solved_with_the_pad(self, form: str) -> None:
         frame = active("frame_compliance", form, compliance=0.05)
         t, x = walk(300)
@@ -257,7 +264,7 @@ class TestInertia:
         force = simulate(
             AIR, [active("inertia", "sprung", mass=mass, frequency=frequency, damping_ratio=damping)], t, x
         )
-        s = t - 0.1 - 0.5 * 2.5e-4  # the change of speed takes a step; this is its middle
+        s = t - 0.1  # the change of speed takes a step; this is its middle
         w = 2 * np.pi * frequency
         w_d = w * np.sqrt(1 - damping**2)
         # the deflection starts from rest with the speed −40; the mass's acceleration is that of a free swing
@@ -265,6 +272,22 @@ class TestInertia:
         de = -40.0 * np.exp(-damping * w * s) * (np.cos(w_d * s) - damping * w / w_d * np.sin(w_d * s))
         expected = np.where(s > 0, -mass * 1e-3 * (w**2 * e + 2 * damping * w * de), 0.0)
         assert_allclose(force[402:], expected[402:], atol=1e-3 * np.abs(expected).max())
+
+    @pytest.mark.parametrize("damping_felt", [0.0, 1.0])
+    def test_a_cell_that_is_the_spring_reads_its_deflection_alone(self, damping_felt: float) -> None:
+        """Under a steady acceleration from rest, at any spacing of the samples."""
+        frequency, damping, mass = 30.0, 0.4, 0.2
+        t = np.sort(np.concatenate([self.t, self.t[100:] + 3e-4, [0.1 + 1e-5]]))
+        x = np.where(t > 0.1, 0.5 * 1000.0 * (t - 0.1) ** 2, 0.0) - 1000.0
+        numbers = {"mass": mass, "frequency": frequency, "damping_ratio": damping, "damping_felt": damping_felt}
+        force = simulate(AIR, [active("inertia", "sprung", **numbers)], t, x)
+        w = 2 * np.pi * frequency
+        s, w_d = np.maximum(t - 0.1, 0.0), w * np.sqrt(1 - damping**2)
+        fades = np.exp(-damping * w * s)
+        read = 1 - fades * (np.cos(w_d * s) + damping * w / w_d * np.sin(w_d * s))
+        read += damping_felt * 2 * damping * w / w_d * fades * np.sin(w_d * s)
+        apart = np.abs(force - mass * read)[t > 0.1 + 2e-3]  # the speed's first change is rounded
+        assert apart.max() < 4e-3 * mass
 
     def test_a_stiff_spring_is_the_rigid_mass(self) -> None:
         x = -100.0 + 0.5 * 1000.0 * self.t**2

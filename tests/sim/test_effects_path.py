@@ -66,7 +66,7 @@ class TestClockSkew:
 
 
 class TestSensorLag:
-    @pytest.mark.parametrize("form", ["first_order", "two_poles", "butterworth", "moving_average"])
+    @pytest.mark.parametrize("form", ["first_order", "two_poles", "butterworth", "moving_average", "decimator"])
     @pytest.mark.parametrize("t", [EVEN, UNEVEN], ids=["even", "uneven"])
     def test_behind_a_ramp_by_the_time_constant(self, form: str, t: Array) -> None:
         tau = 0.03
@@ -97,8 +97,27 @@ class TestSensorLag:
         w = 8000
         assert_allclose(out[w:], (total[w:] - total[:-w]) / 0.08, atol=1e-5)
 
+    def test_a_decimator_is_a_mean_of_which_the_ramp_says_delay_and_width(self) -> None:
+        tau, width, s = 0.02, 0.5, UNEVEN - UNEVEN[0]
+        out = sense(active("sensor_lag", "decimator", time_constant=tau, width=width), UNEVEN, s)
+        inside = np.clip(s - (1 - width) * tau, 0.0, 2 * width * tau)
+        expected = inside**2 / (4 * width * tau) + np.maximum(s - (1 + width) * tau, 0.0)
+        assert_allclose(out, expected, atol=1e-12)
+
+    def test_a_decimator_is_nearly_three_means_in_a_row(self) -> None:
+        t = np.arange(20001) * 1e-4
+        force = np.sin(2 * np.pi * 20.0 * t)
+        tau, w = 0.006, 40  # three windows of 2/3 τ
+        three = force.copy()
+        for _ in range(3):
+            total = np.concatenate([[0.0], np.cumsum((three[1:] + three[:-1]) / 2)])
+            three = np.concatenate([three[:w], (total[w:] - total[:-w]) / w])
+        out = sense(active("sensor_lag", "decimator", time_constant=tau), t, force)
+        late = sense(active("sensor_lag", "moving_average", time_constant=tau), t, force)
+        assert np.abs(out - three)[1000:].max() < 1e-3 < 0.02 < np.abs(late - three)[1000:].max()
+
     def test_the_first_sample_is_rest(self) -> None:
-        for form in ("first_order", "two_poles", "butterworth", "moving_average"):
+        for form in ("first_order", "two_poles", "butterworth", "moving_average", "decimator"):
             assert_allclose(sense(active("sensor_lag", form), EVEN[:50], np.full(50, 4.0)), 4.0)
 
 

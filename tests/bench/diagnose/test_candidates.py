@@ -67,3 +67,13 @@ def test_another_shape_has_the_numbers_that_it_shares_with_the_one_found():
     fit = Fit(structure, x, 0.0, np.eye(len(x)), True)
     slotted = alike(fit, 0, cause_of(cogging, cogging.form("slotted")))
     assert slotted.start == pytest.approx({"amplitude": 0.2, "period": 1.3, "phase": 0.4, "steepness": 2.0})
+
+
+@pytest.mark.parametrize("force_N", [0.5, 50.0])
+def test_a_joint_opens_or_closes_within_the_forces_that_were_met(force_N):
+    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=3.0, depth_mm=2.5, force_N=force_N)
+    for form in ("joint", "closing"):
+        preload = next(
+            p for p in narrowed(effect("frame_compliance").form(form), reach).parameters if p.name == "preload"
+        )
+        assert 0 < preload.lower < min(preload.starts) < max(preload.starts) < preload.upper <= force_N

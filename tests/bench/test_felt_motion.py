@@ -1,0 +1,62 @@
+"""Motion without its noise: rests stay at rest, moves stay whole."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bench.felt_motion import felt
+from bench.motion_between import _carried_on
+
+Array = NDArray[np.float64]
+
+STEP_S, NOISE_MM = 2e-3, 1e-3
+
+
+def trapezoid(t: Array, begins_s: float, way_mm: float, speed_mm_s: float, acceleration_mm_s2: float) -> Array:
+    """A move from rest to rest."""
+    rises, whole = speed_mm_s / acceleration_mm_s2, way_mm / speed_mm_s + speed_mm_s / acceleration_mm_s2
+    s = np.clip(t - begins_s, 0.0, whole)
+    ends = np.minimum(s, whole - s)
+    ramp = 0.5 * acceleration_mm_s2 * np.minimum(ends, rises) ** 2 + speed_mm_s * np.maximum(ends - rises, 0.0)
+    return np.where(s <= whole / 2, ramp, way_mm - ramp)
+
+
+def staircase(t: Array) -> Array:
+    """Five moves of 0.4 mm, 12 s apart."""
+    return np.sum([trapezoid(t, 6.0 + 12.0 * k, 0.4, 20.0, 1000.0) for k in range(5)], axis=0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_rest_has_one_level_whatever_its_noise(seed: int) -> None:
+    """Among so many samples some are far off, and some of their neighbours too; a mass would feel each as a blow."""
+    t = np.arange(0.0, 66.0, STEP_S)
+    x = staircase(t)
+    told = felt(t, x + NOISE_MM * np.random.default_rng(seed).standard_normal(t.size))
+    off = np.interp(t, told.time_s, told.position_mm) - x
+    assert np.abs(off[np.gradient(x) == 0.0]).max() < 0.3 * NOISE_MM
+
+
+def test_a_short_step_out_of_a_rest_is_motion() -> None:
+    t = np.arange(0.0, 66.0, STEP_S)
+    x = staircase(t)
+    out = (t > 20.0) & (t < 20.05)
+    x[out] += 6 * NOISE_MM
+    told = felt(t, x + NOISE_MM * np.random.default_rng(1).standard_normal(t.size))
+    assert np.mean(np.interp(t[out], told.time_s, told.position_mm) - staircase(t)[out]) > 5 * NOISE_MM
+
+
+@pytest.mark.parametrize(
+    ("steps", "pauses"),
+    [
+        ([7.0, 7.0, 5.5, 7.5, 7.0], []),  # a move hardly faster than its noise goes on
+        ([7.0, 7.0, 5.5, 5.8, 7.0], []),
+        ([7.0, 7.0, 0.1, 7.5, 7.0], [2]),  # a rest, however short
+        ([7.0, 7.0, 5.5, -7.5, -7.0], [2]),  # a turn
+        ([7.0, 7.0, 5.5, 5.5, 5.5, 7.0], [2, 3, 4]),
+    ],
+)
+def test_a_move_is_not_cut_where_it_hardly_slows_down(steps: list[float], pauses: list[int]) -> None:
+    position = np.concatenate([[0.0], np.cumsum(steps)])
+    for sign in (1.0, -1.0):
+        moving = _carried_on(np.abs(np.diff(position)) > 6.0, sign * position)
+        assert np.flatnonzero(~moving).tolist() == pauses
