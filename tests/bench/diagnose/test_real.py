@@ -46,7 +46,7 @@ def test_the_worked_example_finds_the_friction_of_its_strokes(example: Outcome) 
     speed = np.gradient(held.position_mm, held.time_s)
     force = held.force_N
     half = 0.5 * (np.median(force[speed > 0.3]) - np.median(force[speed < -0.3]))  # of the gap between the two ways
-    assert friction.confidence > 0.9
+    assert friction.confidence > 0.7
     assert friction.parameters["coulomb"].value == pytest.approx(half, rel=0.2)
 
 
