@@ -172,7 +172,8 @@ def _yielding(force: Array) -> tuple[Mask, float | None]:
             # a value that only stays the same sticks: it is what is beside it that must be calm
             at, long = _runs(core)
             k = int(np.argmax(long))
-            apart = np.concatenate([bend[first - 1 : first + at[k]], bend[first + at[k] + long[k] - 2 : last - 1]])
+            begin, within = first + at[k], max(int(long[k]) - 2, 0)
+            apart = np.concatenate([bend[first - 1 : begin], bend[begin + within : last - 1]])
             if len(apart) < CEILING or len(long) < DISTINCT:
                 continue
             quiet = float(np.mean(apart)) / usual

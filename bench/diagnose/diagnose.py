@@ -41,7 +41,7 @@ TOLD = 0.002  # of the noise power
 LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and a further cause must take of what was
 # held out
 DOUBTED, LITTLE = 0.3, 0.08  # sure of a name, and of the error beyond the noise: a further cause with less is none
-HARM = 1.2  # times the square of the error of what comes later: a cause that makes more of it is none
+HARM = 1.2  # times the square of an error: a cause that makes more of it is none
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 SETTLED_S = 0.15  # after a move
 RIVALS = 4  # models of the best single causes that are kept
@@ -95,8 +95,8 @@ def _needless(
     order = sorted(range(last + 1), key=lambda k: squares[k] - squares[k + 1])
     for k in order:
         taken, gain, left = squares[k] - squares[k + 1], excess[k] - excess[k + 1], excess[k]
-        if k < last and gain <= FURTHER * scale:
-            # of two that hide each other neither is of use alone
+        if k < last and gain <= FURTHER * scale and squares[k + 1] <= HARM * squares[k]:
+            # of two that hide each other neither is of use alone; but neither does it harm
             alone = held_out_square(prepared, without(prepared, fits[-1], own + k))
             taken, gain, left = alone - squares[-1], max(alone - floor, 0.0) - excess[-1], max(alone - floor, 0.0)
         if taken <= 0.0:

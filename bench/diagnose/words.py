@@ -69,8 +69,10 @@ def force(value_N: float, digits: int = 3) -> str:
 
 
 def percent(share: float) -> str:
-    """A share for reading; never 100 % where something is missing."""
+    """A share for reading; never 100 % where something is missing, and no number for what nobody can see."""
     value = 100 * share
+    if 0 < value < 0.001:
+        return "0 %"
     if 99.5 <= value < 99.95:
         return f"{value:.1f} %"
     return f"{value:.0f} %" if value >= 9.5 else f"{value:.2g} %"
