@@ -113,8 +113,8 @@ def surface_force(
 def free_surface(
     program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, depth: float, A: float, B: float
 ) -> float:
-    """Depth at which a pad that has let go carries no force; `depth` itself where the force there is not below 0. The
-    scratch copy is then the state there.
+    """Depth at which a pad that has let go carries no force; `depth` itself where the force there is not below 0, or is
+    so at every depth. The scratch copy is then the state there.
 
     Newton's steps from the last surface with the last slope, then secant steps, within a bracket: a surface recovers
     little in a step, and the force there rises with the depth.
@@ -124,6 +124,11 @@ def free_surface(
     low = max(depth, 0.0)  # nothing of the pad's changes above its surface
     s = max(state[pad + SURFACE], low)
     f = surface_force(program, params, state, shift, dt, s, A, B)
+    if (
+        f < -tolerance and s > depth
+    ):  # a surface that goes deeper: a law may fall with the depth, so the probe may be on
+        if surface_force(program, params, state, shift, dt, depth, A, B) >= 0.0:
+            return depth
     a, f_a = s, f
     width = max(s - low, 1e-6)
     for _ in range(60):
@@ -133,6 +138,9 @@ def free_surface(
         s += width
         width *= 2.0
         f = surface_force(program, params, state, shift, dt, s, A, B)
+    if not f >= -tolerance:  # a law that falls with the depth has none: the surface stays with the probe
+        surface_force(program, params, state, shift, dt, depth, A, B)
+        return depth
     high = s
     slope = (f - f_a) / (s - a) if s > a else state[pad + STEEPNESS]
     stale = 0
@@ -203,7 +211,7 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
         if F < 0.0:
             surface = free_surface(program, params, state, shift, dt, depth, A, B)
             off = surface > depth
-            F = 0.0 if off else surface_force(program, params, state, shift, dt, depth, A, B)
+            F = 0.0 if off else max(surface_force(program, params, state, shift, dt, depth, A, B), 0.0)
             surface = max(surface, 0.0)
         scratch = program[SCRATCH] - program[INNER]
         Fe = state[pad - shift + scratch + FE]
