@@ -124,11 +124,9 @@ def free_surface(
     low = max(depth, 0.0)  # nothing of the pad's changes above its surface
     s = max(state[pad + SURFACE], low)
     f = surface_force(program, params, state, shift, dt, s, A, B)
-    if (
-        f < -tolerance and s > depth
-    ):  # a surface that goes deeper: a law may fall with the depth, so the probe may be on
-        if surface_force(program, params, state, shift, dt, depth, A, B) >= 0.0:
-            return depth
+    # a surface that goes deeper: where a law falls with the depth, the probe may be on the pad
+    if f < -tolerance and s > depth and surface_force(program, params, state, shift, dt, depth, A, B) >= 0.0:
+        return depth
     a, f_a = s, f
     width = max(s - low, 1e-6)
     for _ in range(60):
