@@ -11,6 +11,7 @@ from scipy.special import erfcx
 from sim.effects import effect
 from sim.effects.missing_relaxation_mode import _stretched_rates
 from sim.elastic import Exponential, Polynomial, Power, Spline
+from sim.model import Model
 from sim.pad import Cascade, Pad
 from sim.relaxation import Relaxation
 from tests.sim.effect_tools import GEL, LINEAR, SOFT, K, active, ramp, simulate
@@ -388,3 +389,22 @@ class TestSeparationAndAdhesion:
         assert_allclose(plant.step(1e-3, -0.1), -0.15, rtol=1e-6)
         assert plant.step(1e-3, -0.25) == 0.0
         assert_allclose(plant.step(1e-3, -0.1), 0.0, atol=1e-6)
+
+
+def test_a_law_that_falls_with_the_depth_makes_a_force_that_is_a_number() -> None:
+    """Below its crest no surface is free of force: there is none to be sought."""
+    model = Model.from_dict(
+        {
+            "pad": {
+                "elastic": {"law": "polynomial", "alpha": [0.0, 2.8, 0.67, 0.41, -0.083]},
+                "relaxation": {"shares": [0.6, 0.2], "rates": [2.5, 0.2]},
+                "contact": "unilateral",
+            },
+            "effects": [{"id": "viscous_damping", "form": "power", "coefficient": 0.13, "exponent": 0.6}],
+        }
+    )
+    time = np.arange(0.0, 30.0, 0.1)
+    press = np.minimum(time, 6.8) + 2e-6 * np.random.default_rng(3).normal(size=time.size) * (time > 6.8)
+    force = model.simulate(time, press)
+    assert np.isfinite(force).all()
+    assert force.min() >= 0.0 and 5.0 < force.max() < 100.0
