@@ -73,9 +73,9 @@ def analyse(
 
     `structure`: `law`, `order`, `contact`, `degree` of the fit, where they are not to be found out (as `identify.fit`).
     Diagnosed is what was believed, or else the fit; a run in air tells of the bench alone. `believed` and `prediction`
-    are the recording's own where they are not given. What cannot be fitted (an air run,
-    a run stopped before the pad) is said in the report, and so is what cannot be diagnosed. Raises `InputError` where
-    the recording cannot be read.
+    are the recording's own where they are not given. What cannot be fitted (an air run, a run stopped before the pad)
+    is said in the report, and so is what cannot be diagnosed. Raises `InputError` where the recording cannot
+    be read.
     """
     tell = progress or (lambda _: None)
     recording = read_recording(folder)

@@ -114,7 +114,7 @@ def free_surface(
     program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, depth: float, A: float, B: float
 ) -> float:
     """Depth at which a pad that has let go carries no force; `depth` itself where the force there is not below 0, or is
-    so at every depth. The scratch copy is then the state there.
+    so at every depth. Where it is not `depth`, the scratch copy is then the state there.
 
     Newton's steps from the last surface with the last slope, then secant steps, within a bracket: a surface recovers
     little in a step, and the force there rises with the depth.
@@ -137,7 +137,6 @@ def free_surface(
         width *= 2.0
         f = surface_force(program, params, state, shift, dt, s, A, B)
     if not f >= -tolerance:  # a law that falls with the depth has none: the surface stays with the probe
-        surface_force(program, params, state, shift, dt, depth, A, B)
         return depth
     high = s
     slope = (f - f_a) / (s - a) if s > a else state[pad + STEEPNESS]
@@ -151,11 +150,9 @@ def free_surface(
             c = 0.5 * (low + high)
             stale = 0
         if not low < c:
-            if not sure:
-                sure = True
-                f = surface_force(program, params, state, shift, dt, depth, A, B)
-                if f >= 0.0:
-                    return depth
+            if not sure and surface_force(program, params, state, shift, dt, depth, A, B) >= 0.0:
+                return depth
+            sure = True
             c = 0.5 * (low + high)
         if not low < c < high:  # nothing lies between
             break

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from bench.identify.motion import holds
 from sim.effects import all_effects
 from sim.effects.base import Effect, Form, Parameter
-from sim.elastic import NoPad
+from sim.elastic import ElasticLaw, NoPad
 
 from . import ripple
 from .data import Data
@@ -295,9 +295,8 @@ def _inside(value: float, lower: float, upper: float) -> float:
     return min(max(value, lower), upper)
 
 
-def _amended(fit: Fit, cause: Cause, found: int | None = None) -> list[Cause]:
-    """Another law in place of the believed: numbers with which it is near the curve that was fitted, or near that of
-    the fit's cause `found`."""
+def _amended(fit: Fit, cause: Cause, drawn: ElasticLaw | None = None) -> list[Cause]:
+    """Another law in place of the believed: numbers with which it is near `drawn`, or the curve that was fitted."""
     structure = fit.structure
     pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
     fitted = cause.fitted
@@ -306,9 +305,7 @@ def _amended(fit: Fit, cause: Cause, found: int | None = None) -> list[Cause]:
     if not fitted or amend(pad, cause.start).law == pad.law:
         return [cause]
     depth = np.linspace(0.02, 1.0, 60) * structure.pad.depth_mm
-    drawn = None if found is None else structure.causes[found].form.amend
-    law = pad.law if drawn is None or found is None else drawn(pad, structure.values(fit.x)[found]).law
-    wanted = law.force(depth)
+    wanted = (pad.law if drawn is None else drawn).force(depth)
     scale = max(float(np.abs(wanted).max()), 1e-12)
     probe = Structure(structure.pad, (cause,))
     at = probe.of_cause(0)
@@ -338,10 +335,10 @@ def _amended(fit: Fit, cause: Cause, found: int | None = None) -> list[Cause]:
 def alike(fit: Fit, index: int, cause: Cause) -> Cause:
     """Another shape of one of a fit's causes, to start from where that one is: near its curve where it is a law, and
     else with the numbers that they share."""
-    own = fit.structure.causes[index]
-    if own.form.amend is not None and cause.form.amend is not None:
-        return _amended(fit, cause, index)[0]
-    values = fit.structure.values(fit.x)[index]
+    amend, values = fit.structure.causes[index].form.amend, fit.structure.values(fit.x)[index]
+    if amend is not None and cause.form.amend is not None:
+        pad = fit.structure.pad.at(fit.x[: len(fit.structure.pad.coordinates)])
+        return _amended(fit, cause, amend(pad, values).law)[0]
     return cause.with_start(**{p.name: values[p.name] for p in cause.fitted if p.name in values})
 
 

@@ -158,21 +158,20 @@ def refit(
         last[:] = [x.copy(), force, J]
         return J
 
+    def left_of(x: Array) -> tuple[Array, float]:
+        """(errors, whitened; χ²), as `errors` and `chi2` have them."""
+        e = data.whitened(data.force_N - force_of(x))
+        return e, float(np.sum(e * e) + np.sum(prior * x**2))
+
     def normal(x: Array) -> tuple[float, Array, Array]:
-        force = force_of(x)
-        J = derivatives(x, force)
-        e = data.whitened(data.force_N - force)
-        value = float(np.sum(e * e) + np.sum(prior * x**2))
+        J = derivatives(x, force_of(x))
+        e, value = left_of(x)
         gradient, matrix = products(e, J)
         return value, gradient - prior * x, matrix + np.diag(prior)
 
-    def cost(x: Array) -> float:
-        e = data.whitened(data.force_N - force_of(x))
-        return float(np.sum(e * e) + np.sum(prior * x**2))
-
     if not len(x0):  # a bench in air, and nothing in doubt: there is nothing to fit
         return Fit(structure, x0, chi2(data, structure, x0), np.zeros((0, 0)), True)
-    solution = minimise(normal, cost, x0, structure.lower, structure.upper, max_steps, tolerance)
+    solution = minimise(normal, lambda x: left_of(x)[1], x0, structure.lower, structure.upper, max_steps, tolerance)
     if exact and age > 1:  # the matrix says how sure the numbers are
         J = jacobian(data, structure, solution.x)
         J[~np.isfinite(J)] = 0.0

@@ -117,30 +117,6 @@ def rigid(dt: float, y: float, state: State, p: State) -> float:
     return _KG_MM * p[0] * (felt + hanging + p[1] * now)
 
 
-@block
-def sprung(dt: float, y: float, state: State, p: State) -> float:
-    """Force of spring and damper on the mass in N; p = (mass, frequency, damping_ratio, damping_felt).
-
-    State: started, y, speed of the step and its length, then as of `ridden`: since, e, de, e and de at the end.
-    """
-    if state[0] == 0.0:
-        state[0] = 1.0
-        state[1] = y
-    omega = 2.0 * math.pi * p[1]
-    if dt > 0.0:
-        speed = (y - state[1]) / dt
-        since, e, de, e_now, de_now = ridden(dt, state[3], speed - state[2], state[4], state[5], state[6], omega, p[2])
-        state[1] = y
-        state[2] = speed
-        state[3] = dt
-        state[4] = since
-        state[5] = e
-        state[6] = de
-        state[7] = e_now
-        state[8] = de_now
-    return -_KG_MM * p[0] * (omega * omega * state[7] + 2.0 * p[3] * p[2] * omega * state[8])
-
-
 _MASS = Parameter("mass", "kg", 0.0, 50.0, 0.1, "mass beyond the cell", required=True, amplitude=True)
 _LEAD = Parameter(
     "lead", "1", 0.0, 0.6, 0.5, "share of its change that an acceleration is carried on by", starts=(0.0, 0.5)
@@ -165,6 +141,12 @@ def _packed(values: Mapping[str, float]) -> tuple[float, ...]:
         values.get("damping_ratio", 0.5),
         values.get("damping_felt", 1.0),
     )
+
+
+def _all_hung(values: Mapping[str, float]) -> tuple[float, ...]:
+    return _packed(
+        {"share": 1.0, "window": 1e-3, **values}
+    )  # the window is of the rigid part, of which nothing is left
 
 
 EFFECT = Effect(
@@ -199,8 +181,9 @@ EFFECT = Effect(
             name="sprung",
             what="the mass swings on a spring of its own",
             parameters=(_MASS, _FREQUENCY, _DAMPING, _FELT),
-            blocks={"probe": sprung},
-            state=(0.0,) * 9,
+            blocks={"probe": rigid},
+            state=(0.0,) * 17,
+            pack=_all_hung,
         ),
         Form(
             name="growing",
