@@ -1,9 +1,9 @@
-"""Which set a shape is of: the modules of the effects tell, `second_…`, `third_…`, `judge_…`, else `first`."""
+"""Which set a shape is of: the modules of the effects tell, `second_…`, `third_…`, `fourth_…`, `judge_…`, else `first`."""
 
 from .effects import EFFECTS
 from .effects.registry import _FIRST, _JUDGE, _MORE, Hide
 
-SETS = ("first", "second", "third", "judge")
+SETS = ("first", "second", "third", "fourth", "judge")
 
 
 def _set(hide: Hide) -> str:

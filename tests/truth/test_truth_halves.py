@@ -1,4 +1,4 @@
-"""The halves keep to themselves; the third shapes and the judge's change a recording, are seen, stay finite."""
+"""The halves keep to themselves; the later shapes and the judge's change a recording, are seen, stay finite."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ RICH = (
     *("cogging", "inertia", "resonance", "force_drift", "force_delay", "sensor_lag", "clock_skew", "outliers"),
     "stuck_samples",
 )
-SHAPES = written_in(CATALOGUE, "third", "judge")
-BEYOND = written_in(tuple(outside(CATALOGUE, "third", "judge")), "third", "judge")
+SHAPES = written_in(CATALOGUE, "third", "fourth", "judge")
+BEYOND = written_in(tuple(outside(CATALOGUE, "third", "fourth", "judge")), "third", "fourth", "judge")
 
 
 def test_the_judge_keeps_to_itself():
@@ -36,7 +36,7 @@ def test_the_judge_keeps_to_itself():
 def test_a_seed_draws_none_of_the_later_shapes():
     plain = {"motion": SHORT, "rate_hz": 200.0}
     drawn = {draw_case(seed, ("friction",), **plain).truth.shapes["friction"] for seed in range(12)}
-    later = shapes_of("friction", "second", "third", "judge")
+    later = shapes_of("friction", "second", "third", "fourth", "judge")
     assert later and drawn <= set(shapes_of("friction", "first"))
     for shape in later:
         assert draw_case(0, ("friction",), 1.0, shape, **plain).truth.shapes == {"friction": shape}

@@ -9,7 +9,7 @@ stress softening by Ogden and Roxburgh (1999), exponential (Miehe 1995), Zúñig
 (2003); damage by Kachanov (1958); adhesion after Derjaguin, Muller, Toporov (1975), Johnson, Kendall, Roberts (1971),
 a capillary bridge of constant volume (Maugis 1987), van der Waals forces of a sphere and a plane (Derjaguin 1934,
 Hamaker 1937), a bilinear law of traction and separation (Alfano and Crisfield 2001); joints after Hertz (1882); damage
-by the load (Miner 1945); flow after Eyring (1936). Those of the judge half are named where they are registered.
+by the load (Miner 1945); flow after Eyring (1936). Those of the fourth shapes are named where they are registered.
 Units: mm, N, s.
 """
 

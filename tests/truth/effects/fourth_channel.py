@@ -1,4 +1,4 @@
-"""The judge half: faults of the force channel.
+"""The fourth shapes: faults of the force channel.
 
 Sources: overload stops of load cells, which take what goes beyond (Doebelin, Measurement Systems); fast transients that
 swing to the other side (IEC 61000-4-4) and those of drives that are switched on and off (Ott, Electromagnetic
@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, judge_shapes
+from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, more_shapes
 
 
-@judge_shapes("saturation", "overload_stop")
+@more_shapes("saturation", "overload_stop")
 def overload_stop(build: Build, shape: str, size: float) -> dict[str, float]:
     """Beyond the limit a stop bears with the cell, which feels 2 to 6 % of what is more."""
     share = max(1 - 0.2 * size * float(build.rng.uniform(0.8, 1.2)), 0.3)
@@ -40,7 +40,7 @@ def _near_switching(build: Build, time_s: np.ndarray) -> np.ndarray:
     return np.flatnonzero((last >= 0) & (time_s - switched[np.maximum(last, 0)] < 0.02))
 
 
-@judge_shapes("outliers", "doublets", "switching", "lost_character")
+@more_shapes("outliers", "doublets", "switching", "lost_character")
 def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     """Pairs of one sign and the other; spikes where the motor is switched on or off; numbers ten times too small.
 
@@ -76,7 +76,7 @@ def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     return fraction
 
 
-@judge_shapes("stuck_samples", "bad_state", "self_calibration")
+@more_shapes("stuck_samples", "bad_state", "self_calibration")
 def stuck_samples(build: Build, shape: str, size: float) -> dict[str, float]:
     """Times of 0.1 to 0.6 s in which two samples of three are lost; or 10 to 25 ms without news every second or
     three.

@@ -1,4 +1,4 @@
-"""The judge half: effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""The fourth shapes: effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 Like `outside_bench`, none of them is what an id of the table means, nor two of them together.
 """
@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from .outside_bench import _AMPLIFIER, _child
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 from .sensor import _disturb
 from .third_outside_bench import _fades
 
@@ -32,7 +32,7 @@ def _zeroed(force, h, band_N, calm_N_s, waits_s, rate_N_s):
     return out
 
 
-@judge_effect("zero_tracking", "tracks", "tares")
+@effect("zero_tracking", "tracks", "tares")
 def zero_tracking(build: Build, shape: str, size: float) -> dict[str, float]:
     """An indicator takes a small load that is calm for a drifting zero, and takes it off (OIML R 76, zero tracking).
 
@@ -50,7 +50,7 @@ def zero_tracking(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"band": band, "rate": rate}
 
 
-@judge_effect("machinery", "fan", "pump")
+@effect("machinery", "fan", "pump")
 def machinery(build: Build, shape: str, size: float) -> dict[str, float]:
     """A fan nearby that comes and goes, or a pump with its strokes, felt in air too (Norton, Noise and Vibration).
 
@@ -92,7 +92,7 @@ def _wandering(child: np.random.Generator, duration_s: float, time_s: float, ste
     return lambda t: np.interp(t, step_s * np.arange(len(path)), path)
 
 
-@judge_effect("sense_wire", "two_level", "wanders")
+@effect("sense_wire", "two_level", "wanders")
 def sense_wire(build: Build, shape: str, size: float) -> dict[str, float]:
     """A bad contact in the bridge's supply or sense wires: the gain changes, the zero does not (HBM, Wägezellen).
 
@@ -111,7 +111,7 @@ def sense_wire(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"drop": drop, "time": time_s}
 
 
-@judge_effect("loose_screw", "each_move", "hard_moves")
+@effect("loose_screw", "each_move", "hard_moves")
 def loose_screw(build: Build, shape: str, size: float) -> dict[str, float]:
     """A cell that is not screwed tight seats itself anew as it is pushed about, and its zero is another one each time.
 
@@ -133,7 +133,7 @@ def loose_screw(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"step": step}
 
 
-@judge_effect("loose_head", "wanders", "jumps")
+@effect("loose_head", "wanders", "jumps")
 def loose_head(build: Build, shape: str, size: float) -> dict[str, float]:
     """A read head or scale that is not fixed: the loop follows it, now more and now less.
 
@@ -158,7 +158,7 @@ def loose_head(build: Build, shape: str, size: float) -> dict[str, float]:
     return told
 
 
-@judge_effect("idle_current", "halved", "detents")
+@effect("idle_current", "halved", "detents")
 def idle_current(build: Build, shape: str, size: float) -> dict[str, float]:
     """A stepper's driver lowers its current a while after each move, and the load pushes the probe back (Acarnley).
 

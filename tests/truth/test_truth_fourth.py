@@ -1,10 +1,10 @@
-"""The judge half of what lies between the motor and the pad against closed forms."""
+"""The fourth shapes of what lies between the motor and the pad against closed forms."""
 
 import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_machine import Wavy, _stiff, _uneven
+from .effects.fourth_machine import Wavy, _stiff, _uneven
 from .laws import Power
 from .motion import Path
 from .sets import shapes_of
@@ -47,10 +47,10 @@ def test_joints_that_slip_make_a_loop():
     assert np.allclose(given[few], (1 - share) * told["compliance"] * force[few], atol=1e-9)
 
 
-@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "fourth"))
 @pytest.mark.parametrize("other", ["friction", "adhesion", "viscous_damping", "stress_softening", "separation"])
 def test_the_frame_goes_with_other_effects(shape, other):
-    shapes = {"frame_compliance": shape, other: shapes_of(other, "judge")[-1]}
+    shapes = {"frame_compliance": shape, other: shapes_of(other, "fourth")[-1]}
     plain = {"motion": SHORT, "rate_hz": 500.0, "law": "power", "contact": "unilateral"}
     truth = draw_case(7, ("frame_compliance", other), 1.0, shapes, **plain).truth
     fine, compliance = truth.fine, truth.parameters["frame_compliance"]["compliance"]
@@ -145,7 +145,7 @@ def test_grease_is_worked_in():
     assert 1.4 < np.max(many) <= 1.5 and 1.0 <= np.max(many[-4001:]) < 1.05
 
 
-@pytest.mark.parametrize("shape", shapes_of("inertia", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("inertia", "fourth"))
 def test_the_mass_of_slow_and_of_quick_motions(shape):
     _, told, build = hidden("inertia", shape)
     t, shares = 1e-4 * np.arange(60_000), []

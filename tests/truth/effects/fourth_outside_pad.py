@@ -1,4 +1,4 @@
-"""The judge half: effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""The fourth shapes: effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 Like `outside_pad`, none of them is what an id of the table means, nor two of them together.
 """
@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from .outside_bench import _child
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 
 
 def _touches(x: np.ndarray) -> np.ndarray:
@@ -18,7 +18,7 @@ def _touches(x: np.ndarray) -> np.ndarray:
     return np.cumsum(inside & ~np.concatenate([[False], inside[:-1]]))
 
 
-@judge_effect("fresh_spot", "stiffness", "height")
+@effect("fresh_spot", "stiffness", "height")
 def fresh_spot(build: Build, shape: str, size: float) -> dict[str, float]:
     """Each touch meets another spot of a pad that is not the same everywhere, as it lies loose or is turned.
 
@@ -36,7 +36,7 @@ def fresh_spot(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"deviation": deviation}
 
 
-@judge_effect("swelling", "swells")
+@effect("swelling", "swells")
 def swelling(build: Build, shape: str, size: float) -> dict[str, float]:
     """A gel takes up water, pressed or not, and its surface comes towards the probe (Tanaka and Fillmore 1979).
 
@@ -48,7 +48,7 @@ def swelling(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"rise": rise}
 
 
-@judge_effect("residue", "builds_up", "falls_off")
+@effect("residue", "builds_up", "falls_off")
 def residue(build: Build, shape: str, size: float) -> dict[str, float]:
     """What sticks to the probe makes it longer: each touch adds a layer, of a fifth to the whole of a thickness.
 
@@ -76,7 +76,7 @@ def _follows(wanted, h, rises_s, falls_s):
     return out
 
 
-@judge_effect("tensing", "bouts", "startles")
+@effect("tensing", "bouts", "startles")
 def tensing(build: Build, shape: str, size: float) -> dict[str, float]:
     """The pad is a muscle, and now and then it tenses: it is stiffer for a while (Oflaz and Baran 2014, in vivo).
 
@@ -116,7 +116,7 @@ def _cooled(touching, h, takes_s, returns_s):
     return out
 
 
-@judge_effect("cold_probe", "stiffens")
+@effect("cold_probe", "stiffens")
 def cold_probe(build: Build, shape: str, size: float) -> dict[str, float]:
     """Fat or wax under a cold probe: as long as it touches, at any depth, the pad takes its temperature and stiffens.
 

@@ -1,4 +1,4 @@
-"""The judge half: the pad's own effects. Those in which force and motion act on each other are forms of `kernel`.
+"""The fourth shapes: the pad's own effects. Those in which force and motion act on each other are forms of `kernel`.
 
 Sources: a film between plates bears an impulse of tension (Stefan 1874, Reynolds 1886); fibrils of a soft adhesive
 (Lakrout, Sergot and Creton 1999) and the speed at which a bond is opened (Gent and Schultz 1972, Maugis and Barquins
@@ -22,11 +22,11 @@ from numba import njit
 from ..laws import Law, _Tabulated
 from ..pad import Pad
 from .curves import stretched
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .structure import hide_law
 
 
-@judge_shapes("separation", "grease_film")
+@more_shapes("separation", "grease_film")
 def grease_film(build: Build, shape: str, size: float) -> dict[str, float]:
     """The lab believes `bonded`. A film bears tension until its impulse is 3 to 8 ms of the greatest force."""
     build.believed = replace(build.believed, contact="bonded")
@@ -35,7 +35,7 @@ def grease_film(build: Build, shape: str, size: float) -> dict[str, float]:
     return {}
 
 
-@judge_shapes("adhesion", "fibrils", "by_rate")
+@more_shapes("adhesion", "fibrils", "by_rate")
 def adhesion(build: Build, shape: str, size: float) -> dict[str, float]:
     """Up to P within 0.15 of the range, P until 0.7 of it, then nothing; or a neck that bears more the quicker it goes.
 
@@ -95,7 +95,7 @@ class Pins(_Tabulated):
         return self.modulus * width * np.sum(met, axis=-1)
 
 
-@judge_shapes("elastic_law", "yeoh", "closed_cells", "pins")
+@more_shapes("elastic_law", "yeoh", "closed_cells", "pins")
 def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     """The true law is another; the believed one is fitted to it. Sizes but 1 lie between (or beyond) the two."""
     rng, depth = build.rng, build.depth_mm
@@ -111,7 +111,7 @@ def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     return hide_law(build, shape, other, size)
 
 
-@judge_shapes("stress_softening", "linear", "simo")
+@more_shapes("stress_softening", "linear", "simo")
 def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
     """In proportion to the way below the deepest point, up to 2 `depth`; or (1 − D(δ_max))/(1 − D(δ)) of the law.
 
@@ -132,7 +132,7 @@ def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"share": float(share), "depth": depth}
 
 
-@judge_shapes("damage", "beyond_threshold", "power")
+@more_shapes("damage", "beyond_threshold", "power")
 def damage(build: Build, shape: str, size: float) -> dict[str, float]:
     """e^{−r Λ}, where only loading deeper than a fifth to a half counts; or (1 + λ/ℓ)^{−r ℓ}, ℓ of 2 to 6 depths.
 
@@ -161,7 +161,7 @@ def _rebounds(x, h, rate, stays, tau):
     return sunk
 
 
-@judge_shapes("permanent_set", "rows", "rebounds")
+@more_shapes("permanent_set", "rows", "rebounds")
 def permanent_set(build: Build, shape: str, size: float) -> dict[str, float]:
     """Rows of cells crush, one each eighth to twelfth of the depth; or a fifth to a third comes back in air.
 
@@ -198,7 +198,7 @@ def log_normal_rates(width: float, rate: float) -> tuple[np.ndarray, np.ndarray]
     return weights[kept] / weights[kept].sum(), rate * np.exp(logs[kept])
 
 
-@judge_shapes("missing_relaxation_mode", "consolidation", "log_normal")
+@more_shapes("missing_relaxation_mode", "consolidation", "log_normal")
 def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, float]:
     """Water that is pressed out, four fifths of it at the slowest rate, which is stated; or a log-normal spectrum.
 
@@ -219,7 +219,7 @@ def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, 
     return {"share": share, "rate": rate}
 
 
-@judge_shapes("depth_dependent_relaxation", "pores", "with_force")
+@more_shapes("depth_dependent_relaxation", "pores", "with_force")
 def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[str, float]:
     """ν (1 + s δ/2)², as pores close or open; or ν (1 + s δ_ref F^e/F_ref), which is s in the mean over the depths."""
     rng, depth, law, most = build.rng, build.depth_mm, build.plant.pad.law, build.force_N
@@ -237,7 +237,7 @@ def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[st
     return {"slope": slope}
 
 
-@judge_shapes("viscous_damping", "kuwabara_kono", "hunt_crossley")
+@more_shapes("viscous_damping", "kuwabara_kono", "hunt_crossley")
 def viscous_damping(build: Build, shape: str, size: float) -> dict[str, float]:
     """c v √(δ/δ_ref), with the radius of contact; or c v F^e/F^e(δ_ref), with the load. δ_ref is half the greatest."""
     coefficient, middle = size * spread(build.rng, 0.005, 0.02), build.depth_mm / 2

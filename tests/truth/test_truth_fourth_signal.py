@@ -1,4 +1,4 @@
-"""The judge half from the cell to the sample, and of the channel's faults, against closed forms."""
+"""The fourth shapes from the cell to the sample, and of the channel's faults, against closed forms."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_a_third_pole_after_a_resonance():
         assert gain(build, ratio * f) == pytest.approx(wanted, rel=0.02)
 
 
-@pytest.mark.parametrize("shape", shapes_of("sensor_lag", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("sensor_lag", "fourth"))
 @pytest.mark.parametrize("size", [0.05, 1.0])
 def test_a_filter_is_late_by_its_delay(shape, size):
     motion = Path(0.0, np.inf).to(2.0, 10.0).hold(0.2).motion()
@@ -158,7 +158,7 @@ def test_a_stop_bears_with_the_cell():
     assert 0.019 < slope[0] < 0.061 and np.allclose(samples.force_N, samples.clean_N)
 
 
-@pytest.mark.parametrize("shape", shapes_of("outliers", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("outliers", "fourth"))
 def test_outliers(shape):
     case = draw_case(2, ("outliers",), 1.0, shape, **MANY)
     truth, hit = case.truth, case.truth.flags["outlier"]
@@ -180,7 +180,7 @@ def test_outliers(shape):
         assert sizes[hit].min() > 17
 
 
-@pytest.mark.parametrize("shape", shapes_of("stuck_samples", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("stuck_samples", "fourth"))
 def test_stuck_samples(shape):
     case = draw_case(2, ("stuck_samples",), 1.0, shape, **MANY)
     stuck = case.truth.flags["stuck"]

@@ -1,4 +1,4 @@
-"""The judge half: from the cell to the sample.
+"""The fourth shapes: from the cell to the sample.
 
 Sources: transmissibility of a spring and a damper side by side (Den Hartog, Mechanical Vibrations); amplifiers whose
 bandwidth is near the cell's own frequency (Doebelin, Measurement Systems); lead and lag of a divider with a capacitor;
@@ -13,12 +13,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import cheb1ap
 
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import _LAG, _RESONANCE, _disturb, first_order, ramp_filter, second_order
 from .third_signal import all_pole
 
 
-@judge_shapes("resonance", "transmitted", "amplifier")
+@more_shapes("resonance", "transmitted", "amplifier")
 def resonance(build: Build, shape: str, size: float) -> dict[str, float]:
     """The damper passes force on as well, (2 ζ ω s + ω²)/(s² + 2 ζ ω s + ω²); or a third pole at 2 to 4 ω follows."""
     rng = build.rng
@@ -35,7 +35,7 @@ def resonance(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"frequency": frequency, "damping_ratio": damping}
 
 
-@judge_shapes("sensor_lag", "partly", "chebyshev")
+@more_shapes("sensor_lag", "partly", "chebyshev")
 def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     """A fifth to two fifths passes at once, the rest late; or four poles after Chebyshev with a ripple of 0.5 dB.
 
@@ -53,7 +53,7 @@ def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"time_constant": tau}
 
 
-@judge_shapes("force_delay", "blocks")
+@more_shapes("force_delay", "blocks")
 def blocks(build: Build, shape: str, size: float) -> dict[str, float]:
     """Samples come in blocks of 16 to 64 ms; each block is late by its own, normal about the mean, a fifth of it."""
     delay = 2e-3 * size * spread(build.rng, 0.6, 1.6)
@@ -64,7 +64,7 @@ def blocks(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"delay": delay}
 
 
-@judge_shapes("force_delay", "busy_bus")
+@more_shapes("force_delay", "busy_bus")
 def busy_bus(build: Build, shape: str, size: float) -> dict[str, float]:
     """While the motor moves its messages go first, and the force is late; at rest by 0.5 to 0.8 of that."""
     delay, rests = 2e-3 * size * spread(build.rng, 0.6, 1.6), float(build.rng.uniform(0.5, 0.8))
@@ -73,7 +73,7 @@ def busy_bus(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"delay": delay}
 
 
-@judge_shapes("clock_skew", "slipped_samples")
+@more_shapes("clock_skew", "slipped_samples")
 def slipped_samples(build: Build, shape: str, size: float) -> dict[str, float]:
     """Samples are counted, and at even distances one is lost or comes twice: from there on all are off by one more."""
     skew, rate = 200e-6 * size * spread(build.rng, 0.6, 1.6), build.rate_hz
@@ -83,7 +83,7 @@ def slipped_samples(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"skew": 1e6 * sign * skew}
 
 
-@judge_shapes("clock_skew", "slewed")
+@more_shapes("clock_skew", "slewed")
 def slewed(build: Build, shape: str, size: float) -> dict[str, float]:
     """Every 8 to 20 s a daemon finds the clock off, and for two fifths of the time it runs at 0.4 of its skew.
 
@@ -104,7 +104,7 @@ def slewed(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"skew": 1e6 * skew * float(along(duration) - start) / duration}
 
 
-@judge_shapes("force_bias", "cable")
+@more_shapes("force_bias", "cable")
 def cable(build: Build, shape: str, size: float) -> dict[str, float]:
     """The cell's cable pulls, by a tenth to a fifth more at one end of the way than at the other; stated: the mean."""
     rng = build.rng
@@ -114,7 +114,7 @@ def cable(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"bias": bias}
 
 
-@judge_shapes("force_drift", "battery", "door")
+@more_shapes("force_drift", "battery", "door")
 def drifts(build: Build, shape: str, size: float) -> dict[str, float]:
     """r t (1 + t/2τ), quicker and quicker; or r t until some time, and a quarter of that from there on."""
     rng, duration = build.rng, build.plant.duration_s
@@ -127,7 +127,7 @@ def drifts(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"rate": rate}
 
 
-@judge_shapes("mains_hum", "excitation")
+@more_shapes("mains_hum", "excitation")
 def excitation(build: Build, shape: str, size: float) -> dict[str, float]:
     """Part of it is ripple of the bridge's supply: 0.7 in air, and as much more at the greatest load as it bears.
 

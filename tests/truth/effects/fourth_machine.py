@@ -1,4 +1,4 @@
-"""The judge half: what lies between the motor and the pad.
+"""The fourth shapes: what lies between the motor and the pad.
 
 Sources: frames with a part of plastic or glue, which creeps (Findley, Lai and Onaran 1976); joints whose edges slip
 (Iwan 1966, Gaul and Nitsche 2001); plays that change with the eccentricity of a gear or pulley, or differ each time
@@ -20,12 +20,12 @@ from numba import njit
 
 from ..laws import Law, _Tabulated
 from .outside_bench import _child
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import second_order
 from .third_machine import _sliding, _trails, _worn
 
 
-@judge_shapes("frame_compliance", "creeps", "joints_slip")
+@more_shapes("frame_compliance", "creeps", "joints_slip")
 def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     """A tenth to a fifth of it comes late, within 0.3 to 2 s; or a fifth to two fifths sit in joints that slip.
 
@@ -44,7 +44,7 @@ def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"compliance": compliance}
 
 
-@judge_shapes("backlash", "runout")
+@more_shapes("backlash", "runout")
 def runout(build: Build, shape: str, size: float) -> dict[str, float]:
     """A gear or pulley that runs out: the width swells and shrinks by 15 to 35 % every 0.5 to 1.5 mm; stated: mean."""
     gap, more = 0.02 * size * spread(build.rng, 0.7, 1.4), float(build.rng.uniform(0.15, 0.35))
@@ -66,7 +66,7 @@ def _uneven(x, gaps):
     return y
 
 
-@judge_shapes("backlash", "uneven")
+@more_shapes("backlash", "uneven")
 def uneven(build: Build, shape: str, size: float) -> dict[str, float]:
     """Balls and dirt: each turn finds another width, spread by a sixth to a third about the mean, which is stated."""
     gap, spreads = 0.02 * size * spread(build.rng, 0.7, 1.4), float(build.rng.uniform(0.16, 0.33))
@@ -97,7 +97,7 @@ class Wavy(_Tabulated):
         return self.law.model(depth_mm)
 
 
-@judge_shapes("contact_offset", "settles", "wavy")
+@more_shapes("contact_offset", "settles", "wavy")
 def contact_offset(build: Build, shape: str, size: float) -> dict[str, float]:
     """The surface lies elsewhere; it goes on by an eighth as the sample settles, or is wavy, by up to 15 µm either way.
 
@@ -118,7 +118,7 @@ def contact_offset(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"offset": offset}
 
 
-@judge_shapes("friction", "tight_spots", "polymer_bush", "worked_in")
+@more_shapes("friction", "tight_spots", "polymer_bush", "worked_in")
 def friction(build: Build, shape: str, size: float) -> dict[str, float]:
     """Of rails not quite parallel, of a bush of polymer, or of grease that has lain.
 
@@ -156,7 +156,7 @@ def _stiff(x, h, length_mm, rests_s):
     return out
 
 
-@judge_shapes("inertia", "recoil", "stacked")
+@more_shapes("inertia", "recoil", "stacked")
 def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     """The bench recoils, by a twelfth to a fifth, at 6 to 14 Hz; or half of it sits on an adapter of 80 to 160 Hz.
 
@@ -180,7 +180,7 @@ def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"mass": mass}
 
 
-@judge_shapes("cogging", "thrust", "fractional_slots")
+@more_shapes("cogging", "thrust", "fractional_slots")
 def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     """A part that goes with the thrust; or slots that are no multiple of the poles, and make a second period.
 
@@ -203,7 +203,7 @@ def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "period": period}
 
 
-@judge_shapes("encoder_error", "magnetic_tape", "uneven_poles")
+@more_shapes("encoder_error", "magnetic_tape", "uneven_poles")
 def encoder_error(build: Build, shape: str, size: float) -> dict[str, float]:
     """A tape that is read 1 to 3 % of a period late on either way; or poles that differ, by a fifth or so.
 

@@ -1,9 +1,9 @@
-"""The judge half of the pad's own effects against closed forms."""
+"""The fourth shapes of the pad's own effects against closed forms."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_pad import ClosedCells, Pins, Yeoh, consolidation_rates, log_normal_rates
+from .effects.fourth_pad import ClosedCells, Pins, Yeoh, consolidation_rates, log_normal_rates
 from .laws import Power
 from .motion import Path
 from .pad import Pad
@@ -31,7 +31,7 @@ def test_a_film_bears_an_impulse():
 
 def test_adhesion():
     motion = Path(-0.5).to(1.0, 2.0).hold(0.1).to(-0.5, 2.0).motion()
-    for shape in shapes_of("adhesion", "judge"):
+    for shape in shapes_of("adhesion", "fourth"):
         fine, told, _ = hidden("adhesion", shape, motion=motion)
         x, back = fine.reported_mm, fine.time_s > 0.8
         shares = np.array([0.075, 0.3, 0.6, 0.85])
@@ -134,7 +134,7 @@ def test_spectra_of_relaxation():
         assert np.sqrt(weights @ logs**2) == pytest.approx(width, rel=0.03)
 
 
-@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "fourth"))
 def test_what_is_added_has_its_share(shape):
     pad = Pad(Power(3.0, 0.0), (0.3,), (50.0,))
     motion = Path(2.0).hold(100.0).motion()
@@ -150,7 +150,7 @@ def test_rates_by_depth():
     for depth in (1.0, 1.6):
         motion = Path(depth).hold(2.0).motion()
         for seed in (0, 1, 2):
-            for shape in shapes_of("depth_dependent_relaxation", "judge"):
+            for shape in shapes_of("depth_dependent_relaxation", "fourth"):
                 pad = Pad(Power(3.0, 1.0), (0.4,), (2.0,))
                 fine, told, _ = hidden("depth_dependent_relaxation", shape, pad=pad, motion=motion, seed=seed)
                 s = told["slope"]
@@ -161,7 +161,7 @@ def test_rates_by_depth():
                 assert rate[0] == pytest.approx(2.0 * factor, rel=2e-3)
 
 
-@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "fourth"))
 def test_damping(shape):
     # F = 3 δ²/2 with 2 mm at most: the middle is 1 mm and 1.5 N.
     pad = Pad(Power(3.0, 1.0))

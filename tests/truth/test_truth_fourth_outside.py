@@ -1,10 +1,10 @@
-"""The judge half outside the catalogue: each is what its docstring says."""
+"""The fourth shapes outside the catalogue: each is what its docstring says."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_outside_bench import _zeroed
-from .effects.judge_outside_pad import _cooled, _follows, _touches
+from .effects.fourth_outside_bench import _zeroed
+from .effects.fourth_outside_pad import _cooled, _follows, _touches
 from .motion import Path
 from .test_truth_effects import hidden
 from .test_truth_third_outside import added
