@@ -78,6 +78,11 @@ def right_listed(line: Line) -> bool:
     )
 
 
+def right_or_alike(line: Line) -> bool:
+    """Whether a hidden id is first, or listed beside a first that fits the data without noise as well."""
+    return right_first(line) or (right_listed(line) and bool(line.get("as_good")))
+
+
 def found(line: Line, id: str) -> bool:
     """Whether an id is named at any place."""
     return named(line, id) is not None

@@ -23,6 +23,7 @@ from .count import (
     rate,
     right_first,
     right_listed,
+    right_or_alike,
     spurious,
 )
 from .plan import GROUPS
@@ -80,9 +81,11 @@ def shaped(by: Mapping[str, Sequence[Line]]) -> list[Figure]:
 
     return [
         Figure("right cause first, single, detectable", 0.97, True, rate(single, right_first)),
+        Figure("… or listed beside one that fits as well", 0.97, True, rate(single, right_or_alike)),
         Figure("… or not excluded", None, True, rate(single, right_listed)),
         Figure("… misfit over 0.2 % of the noise power", None, True, rate(told, right_first)),
         Figure("right cause first at 2.5 times the typical size", 0.99, True, rate(large, right_first)),
+        Figure("… or listed beside one that fits as well", 0.99, True, rate(large, right_or_alike)),
         Figure("… or not excluded", None, True, rate(large, right_listed)),
         Figure("unexplained, single, detectable", 0.03, False, rate(single, unexplained)),
         Figure("spurious second cause, single, detectable", 0.03, False, rate(single, spurious)),

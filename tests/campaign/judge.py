@@ -19,6 +19,7 @@ import numpy as np
 from tests.truth.cases import Case, draw_case
 from tests.truth.detect import Lab, _coordinates, _pad, _sigma, _whitened, misfit, sampling
 from tests.truth.noise import Coloured, Quantised, StudentT, White
+from tests.truth.rivals import as_good
 
 from .plan import Item
 
@@ -53,6 +54,7 @@ def run(item: Item, keep: Path | None = None) -> dict[str, Any]:
         else:
             line |= diagnosed(case, case.write(keep))
         line["bounds"] = _bounds(item, line)
+        line["as_good"] = _as_good(item, case, line)
     except Exception:
         line["error"] = traceback.format_exc(limit=-4)
     return line
@@ -133,6 +135,14 @@ def score_flags(case: Case, force_time_s: np.ndarray, flags: dict[str, list[int]
 def named(line: dict[str, Any], id: str) -> dict[str, Any] | None:
     """The cause of that id, if it was named."""
     return next((cause for cause in line["said"]["causes"] if cause["id"] == id), None)
+
+
+def _as_good(item: Item, case: Case, line: dict[str, Any]) -> bool:
+    """Where another id than the lone hidden one was named first: whether it fits the data without noise as well."""
+    first = next((cause["id"] for cause in line["said"]["causes"]), None)
+    if item.group not in ("single", "large") or first in (None, item.ids[0]) or not line["truth"]["detectable"]:
+        return False
+    return as_good(case, str(first))
 
 
 def _bounds(item: Item, line: dict[str, Any]) -> dict[str, float]:

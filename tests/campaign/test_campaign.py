@@ -11,7 +11,7 @@ from tests.truth.cases import draw_case
 from tests.truth.effects import EFFECTS
 
 from .__main__ import read
-from .count import Rate, right_listed, spurious, stated, wrongs
+from .count import Rate, right_listed, right_or_alike, spurious, stated, wrongs
 from .halves import half as half_of
 from .judge import bounds, score_flags, truth_of
 from .plan import CATALOGUE, Item, plan
@@ -169,6 +169,10 @@ def test_second_causes_and_alternatives():
     assert right_listed(line([("backlash", 0.1, 0.1, ("friction",))])) and not right_listed(
         line([("backlash", 1, 1, ())])
     )
+    wrong = line([("backlash", 0.1, 0.1, ("friction",))])
+    assert right_or_alike(line([GOOD])) and right_or_alike(wrong | {"as_good": True})
+    assert not right_or_alike(wrong | {"as_good": False})
+    assert not right_or_alike(line([("backlash", 1, 1, ())]) | {"as_good": True})
     assert [s.near for s in stated(line([GOOD]))] == [True] and stated(line([("backlash", 0.1, 0.1, ())])) == []
 
 

@@ -11,6 +11,7 @@ F^e linear between nodes. Stuck samples are counted by how unlikely their repeat
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,10 +92,17 @@ class Lab:
         recent = np.interp(label + 1e-3, fine.time_s, way) - np.interp(label - 0.06, fine.time_s, way)
         self.lively = recent > 1e-9
 
+    def along(self, pad: Pad) -> np.ndarray:
+        """Force in N at the nodes."""
+        u = pad.law.force(self.depth_mm)
+        return _run(u, self.h, np.array(pad.shares), np.array(pad.rates), pad.contact == "unilateral")
+
     def force(self, pad: Pad) -> np.ndarray:
         """Force in N at the force samples."""
-        u = pad.law.force(self.depth_mm)
-        return _run(u, self.h, np.array(pad.shares), np.array(pad.rates), pad.contact == "unilateral")[self.at]
+        return self.along(pad)[self.at]
+
+
+ForceOf = Callable[[Lab, np.ndarray], np.ndarray]
 
 
 def _coordinates(pad: Pad) -> np.ndarray:
@@ -153,33 +161,40 @@ def _whitened(noise: White | Quantised, time_s: np.ndarray, left: np.ndarray) ->
     return noise.whiten(time_s, left[:, None])[:, 0]
 
 
-def misfit(case: Case) -> Misfit:
-    """Refit the believed structure to the case without noise, and weigh what is left."""
-    truth = case.truth
+def fitted(truth: Truth, x: np.ndarray, force_of: ForceOf, most: int = 400) -> tuple[np.ndarray, float, np.ndarray]:
+    """(numbers, χ², residual in N) of a structure fitted to the case without noise, from `x`.
+
+    force_of: (lab, numbers) → force at the lab's samples, N. most: evaluations of the first of the two fits.
+    """
     lab = Lab(truth)
     sigma = _sigma(truth, lab)
     index, weight = _thinned(lab)
     scale, wanted, few = weight / sigma[index], truth.clean_N[index], Lab(truth, index)
 
     def left(x: np.ndarray) -> np.ndarray:
-        return np.clip((few.force(_pad(truth.structure, x)) - wanted) * scale, -1e8, 1e8)
+        return np.clip((force_of(few, x) - wanted) * scale, -1e8, 1e8)
 
-    best = least_squares(
-        left, _coordinates(truth.structure), method="lm", x_scale="jac", max_nfev=400, ftol=1e-8, xtol=1e-8
-    )
-    x = best.x
+    x = least_squares(left, x, method="lm", x_scale="jac", max_nfev=most, ftol=1e-8, xtol=1e-8).x
     if isinstance(truth.noise, Coloured):
         # What is far in the sum of squares may be near in the whitened one: a few steps more over all samples.
         def whole(x: np.ndarray) -> np.ndarray:
-            off = (lab.force(_pad(truth.structure, x)) - truth.clean_N) * truth.noise.std / sigma
+            off = (force_of(lab, x) - truth.clean_N) * truth.noise.std / sigma
             return np.clip(_whitened(truth.noise, truth.label_time_s, off), -1e8, 1e8)
 
         x = least_squares(whole, x, method="lm", x_scale="jac", max_nfev=150, ftol=1e-4).x
-    refitted = _pad(truth.structure, x)
-    residual = truth.clean_N - lab.force(refitted)
+    residual = truth.clean_N - force_of(lab, x)
     in_units = _whitened(truth.noise, truth.label_time_s, residual * truth.noise.std / sigma)
-    chi2 = float(np.sum(in_units**2))
-    return Misfit(chi2, _faults(truth, sigma), float(np.sqrt(np.mean(residual**2))), refitted, residual)
+    return x, float(np.sum(in_units**2)), residual
+
+
+def misfit(case: Case) -> Misfit:
+    """Refit the believed structure to the case without noise, and weigh what is left."""
+    truth = case.truth
+    start = _coordinates(truth.structure)
+    x, chi2, residual = fitted(truth, start, lambda lab, x: lab.force(_pad(truth.structure, x)))
+    faults = _faults(truth, _sigma(truth, Lab(truth)))
+    rmse_N = float(np.sqrt(np.mean(residual**2)))
+    return Misfit(chi2, faults, rmse_N, _pad(truth.structure, x), residual)
 
 
 def sampling(case: Case) -> float:

@@ -1,0 +1,102 @@
+"""Whether a wrong name could do as well: the believed structure is refitted with a rival beside it, without noise.
+
+What is left is counted as in `detect`. Where it is at most 25, the data cannot tell the rival from what was hidden. A
+rival stands here in its plain shapes, so that a rival in a shape not tried here might do better yet: what is called
+apart may still be alike, not the other way about. Written for what makes the force late, which is what is taken for
+each other most.
+
+What a delay has beyond its mean is chance: samples that wait in a queue, buses that are busy. No fit can know it, so
+that a rival of a delay is held against a constant delay, and not against nothing left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .cases import Case
+from .detect import Lab, _coordinates, _pad, fitted, misfit
+from .effects.sensor import first_order, second_order
+
+AS_GOOD = 25.0
+
+Stage = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""(even times, force, numbers) → force."""
+
+LATE_S = (3e-4, 1e-3, 2e-3, 4e-3, 8e-3, 1.5e-2)
+"""Starts of how late the force is."""
+
+
+def _delayed(t: np.ndarray, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+    return np.interp(t - np.exp(x[0]), t, force)
+
+
+def _one_pole(t: np.ndarray, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+    return first_order(t, force, float(np.exp(x[0])))
+
+
+def _two_poles(t: np.ndarray, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+    half = float(np.exp(x[0])) / 2
+    return first_order(t, first_order(t, force, half), half)
+
+
+def _flattest(t: np.ndarray, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Second order with ζ = 1/√2, whose delay is 2 ζ/ω."""
+    return second_order(t, force, float(np.sqrt(2) / np.exp(x[0]) / (2 * np.pi)), float(np.sqrt(0.5)))
+
+
+def _mean(t: np.ndarray, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Over the last 2 τ; before the start the force was as at the start."""
+    window, off = 2 * float(np.exp(x[0])), force - force[0]
+    whole = np.concatenate([[0.0], np.cumsum((off[1:] + off[:-1]) / 2 * np.diff(t))])
+    return force[0] + (whole - np.interp(t - window, t, whole)) / window
+
+
+def _rings(t: np.ndarray, force: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """2 ζ/ω late; ζ between 0.01 and 0.5, beyond which it is a lag."""
+    damping = 0.01 + 0.49 / (1 + np.exp(-x[1]))
+    return second_order(t, force, float(2 * damping / np.exp(x[0]) / (2 * np.pi)), float(damping))
+
+
+CHANCE = ("force_delay",)
+
+STAGES: dict[str, tuple[tuple[Stage, tuple[float, ...]], ...]] = {
+    "force_delay": ((_delayed, ()),),
+    "sensor_lag": ((_one_pole, ()), (_two_poles, ()), (_flattest, ()), (_mean, ())),
+    "resonance": ((_rings, (0.0,)),),
+}
+"""Shapes by id, and what their numbers begin with after the logarithm of how late."""
+
+
+def left_beside(case: Case, id: str) -> float | None:
+    """χ² that the believed structure leaves with the rival beside it, the best of its shapes; None: no rival known."""
+    if id not in STAGES:
+        return None
+    truth = case.truth
+    t, own = truth.fine.time_s, _coordinates(misfit(case).refitted)
+
+    def force_of(stage: Stage) -> Callable[[Lab, np.ndarray], np.ndarray]:
+        def force(lab: Lab, x: np.ndarray) -> np.ndarray:
+            even = np.interp(t, lab.nodes, lab.along(_pad(truth.structure, x[: len(own)])))
+            return np.interp(lab.nodes[lab.at], t, stage(t, even, x[len(own) :]))
+
+        return force
+
+    lab, best = Lab(truth), np.inf
+    for stage, more in STAGES[id]:
+        force, starts = force_of(stage), [np.array([*own, np.log(late), *more]) for late in LATE_S]
+        start = min(starts, key=lambda x: float(np.sum((force(lab, x) - truth.clean_N) ** 2)))
+        best = min(best, fitted(truth, start, force, 150)[1])
+        if best <= AS_GOOD:
+            break
+    return best
+
+
+def as_good(case: Case, id: str) -> bool:
+    """Whether the rival fits the noise-free data of a case of one effect as well as what was hidden does."""
+    rival, hidden = left_beside(case, id), case.truth.ids[0]
+    if rival is None or rival <= AS_GOOD or hidden not in CHANCE:
+        return rival is not None and rival <= AS_GOOD
+    own = left_beside(case, hidden)
+    return own is not None and rival <= own + AS_GOOD
