@@ -61,6 +61,8 @@ class Faults:
     bent: Mask
     limit_N: float | None = None
     stuck_share: float | None = None
+    unsure: Mask | None = None
+    """Samples that stand off in moves: strays, or transients that no model has made yet."""
 
     @property
     def by_itself(self) -> Mask:
@@ -376,16 +378,23 @@ def not_of_the_motion(m: Measurement, found: Faults) -> Faults:
     A value that comes again and again is no transient's."""
     if not found.outlier.any():
         return found
+    still = resting(m)
+    in_holds = (found.outlier & still).sum() / max(still.sum(), 1)
+    in_moves = (found.outlier & ~still).sum() / max((~still).sum(), 1)
+    if still.sum() > 50 and in_moves > CROWDED * in_holds + 2.0 / max((~still).sum(), 1):
+        kept = found.outlier & (still | _one_value(m.force_N, found.outlier))
+        return replace(found, outlier=kept, unsure=found.outlier & ~kept)
+    return found
+
+
+def resting(m: Measurement) -> Mask:
+    """Force samples (m,) in holds, once these have settled."""
     still = np.zeros(len(m.force_N), dtype=bool)
     for s in holds(m.position_time_s, m.position_mm):
         first, last = np.searchsorted(m.force_time_s, [m.position_time_s[s.start], m.position_time_s[s.stop - 1]])
         settled = int(first) + min(int(last - first) // 4, SETTLING)
         still[settled : int(last)] = True
-    in_holds = (found.outlier & still).sum() / max(still.sum(), 1)
-    in_moves = (found.outlier & ~still).sum() / max((~still).sum(), 1)
-    if still.sum() > 50 and in_moves > CROWDED * in_holds + 2.0 / max((~still).sum(), 1):
-        return replace(found, outlier=found.outlier & (still | _one_value(m.force_N, found.outlier)))
-    return found
+    return still
 
 
 def standing_off(residual: Array, good: Mask, suspect: Mask) -> Mask:

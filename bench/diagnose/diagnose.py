@@ -16,7 +16,7 @@ from bench.recording.types import Measurement
 from sim.model import Model
 from sim.pad import Pad
 
-from .channel import Faults, faults, not_of_the_motion, standing_off
+from .channel import Faults, faults, not_of_the_motion, resting, standing_off
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS
@@ -61,6 +61,9 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     search = Search(prepared, structure, tell, ["saturation"] if flags.saturated.any() else [])
     tell("refitting what is believed")
     base = search.base(_pads(m, believed, structure, flags.good))
+    if flags.unsure is not None:
+        prepared, flags, search, path = _asked_again(m, prepared, flags, search, Path([base]))
+        base = path.fits[0]
     tell("looking for causes")
     path = search.path(base)
     prepared = search.prepared
@@ -186,18 +189,28 @@ def _pads(m: Measurement, believed: Model, structure: Structure, good: Mask) -> 
 def _asked_again(
     m: Measurement, prepared: Prepared, flags: Faults, search: Search, path: Path
 ) -> tuple[Prepared, Faults, Search, Path]:
-    """Channel faults against the model found; where that changes which samples count, the fits are carried on."""
-    fit = path.fits[-1]
-    if mean_square(prepared.full, fit.structure, fit.x) > (NEAR * prepared.floor_N) ** 2:
+    """Channel faults against the model found; where that changes which samples count, the fits are carried on.
+
+    Samples that stand off in moves are strays, and no transients, where the model is right about those beside them.
+    """
+    fit, full, at = path.fits[-1], prepared.full, prepared.at
+    unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
+    sure = full.weight.copy()
+    sure[at[unsure[prepared.kept]]] = 0.0
+    error = full.force_N - force_at(full, fit.structure, fit.x)
+    near = (NEAR * prepared.floor_N) ** 2
+    if np.average(error**2, weights=sure) > near:
         return prepared, flags, search, path  # against a wrong model transients look like outliers
-    residual = prepared.full.force_N - force_at(prepared.full, fit.structure, fit.x)
     errors = np.full(len(m.force_N), np.nan)
-    errors[prepared.kept] = residual[prepared.at]
+    errors[prepared.kept] = error[at]
     known = np.isfinite(errors) & ~flags.by_itself
-    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, flags.outlier)
+    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, flags.outlier | unsure)
     if outlier.sum() == flags.outlier.sum() and np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
-    flags = not_of_the_motion(m, replace(flags, outlier=outlier))
+    flags = replace(flags, outlier=outlier, unsure=None)
+    beside = known & ~outlier & ~resting(m)
+    if not beside.any() or float(np.mean(errors[beside] ** 2)) > near:
+        flags = not_of_the_motion(m, flags)
     anew = prepare(m, flags.good)
     prepared = anew.white() if prepared.memory == 1.0 else anew
     again = Search(prepared, search.believed, search.progress, search.known)

@@ -75,6 +75,8 @@ class Path:
 
     fits: list[Fit]
     rivals: list[list[Trial]] = field(default_factory=list)
+    tried: list[list[str]] = field(default_factory=list)
+    """Ids, best first, with those that could not be believed where they stood."""
     measures: list[Measure] = field(default_factory=list)
     evidence: list[Evidence] = field(default_factory=list)
 
@@ -354,7 +356,8 @@ class Search:
             self._whitened(path)
             first, memory = len(path.fits) == 1, self.prepared.memory
             least = least_gain(path.fits[0], memory, self.samples, self.expected, first)
-            every = [t for t in self.ranked(path.fits[-1], least=least) if believable(t.fit, self.prepared)]
+            tried = self.ranked(path.fits[-1], least=least)
+            every = [t for t in tried if believable(t.fit, self.prepared)]
             present = {c.id for c in path.fits[-1].structure.causes}
             ranked = [t for t in every if t.id not in present]
             if not ranked:
@@ -365,6 +368,7 @@ class Search:
             base = path.fits[0]
             found = self.judge(now, best.fit, base)
             path.rivals.append(ranked)
+            path.tried.append([t.id for t in tried])
             path.measures.append(Measure(self.expected, self.effective, self.prepared.memory))
             path.evidence.append(found)
             gained = now.chi2 - best.fit.chi2
@@ -373,13 +377,18 @@ class Search:
                 recurved, other = len(path.fits), self.recurved(now)
                 if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but one found of another shape
                     path.fits[-1] = other
-                    del path.rivals[-1], path.measures[-1], path.evidence[-1]
+                    del path.rivals[-1], path.tried[-1], path.measures[-1], path.evidence[-1]
                     continue
-            if not found.pays or self._reshaped(now.chi2, best.fit.chi2, reshaped):
+            if self._reshaped(now.chi2, best.fit.chi2, reshaped):
                 break
             path.fits.append(best.fit)
-            if len(path.fits) > 2 and best.fit.chi2 > 1.05 * self.expected:
+            if len(path.fits) > 2 and best.fit.chi2 > 1.05 * self.expected and (found.pays or more):
                 path.fits[-1] = self.exchanged(path)
+            if not found.pays:  # what stood first may have been in the place of two others
+                path.evidence[-1] = self.judge(now, path.fits[-1], base)
+                if not path.evidence[-1].pays:
+                    path.fits.pop()
+                    break
         return path
 
     def _whitened(self, path: Path) -> None:
@@ -436,9 +445,7 @@ class Search:
         score = best.chi2 + self._penalty(best)
         own = len(self.believed.causes)
         for index in range(own, len(best.structure.causes)):
-            rivals = [t.id for t in path.rivals[min(index - own, len(path.rivals) - 1)][:5]] + [
-                t.id for t in path.rivals[-1][:4]
-            ]
+            rivals = path.tried[min(index - own, len(path.tried) - 1)][:5] + path.tried[-1][:4]
             present = {c.id for c in best.structure.causes}
             rivals = [r for r in dict.fromkeys(rivals) if r not in present]
             if not rivals:

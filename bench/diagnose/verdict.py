@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .data import Prepared
-from .evidence import tempered, unexplained
+from .evidence import SPEAKS, tempered, unexplained
 from .held_out import held_out_square
 from .late import LATE
 from .refit import Fit, force_at, reduced, refit
@@ -17,6 +17,7 @@ from .search import Measure, Path, Search, Trial
 
 RIVAL = 25.0  # Δχ², rescaled by what is left: less does not exclude a rival
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
+SURELY = 4.0  # deviations by which the squares of two fits differ
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
 
@@ -53,7 +54,8 @@ def chain(prepared: Prepared, fit: Fit, base: Fit) -> list[Fit]:
 
 
 def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[list[float], list[float]]:
-    """(held-out mean squares, those less the noise floor's square), N²; what is within chance of 0 counts as 0."""
+    """(held-out mean squares, those less the noise floor's square), N²; what is within chance of 0 counts as 0, unless
+    a later fit takes it off: two fits share their noise, and their difference is far surer than the floor."""
     squares = [held_out_square(prepared, fit) for fit in fits]
     n, memory = float(prepared.full.weight.sum()), prepared.colour.memory
     noise_std = max(prepared.floor_square_std, _square_std(prepared, fits[-1]))
@@ -63,6 +65,11 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
         excess = square - floor_N**2
         joined = number == 0 and len(fits) > 1
         out.append(max(excess, 0.0) if joined or excess > doubt else 0.0)
+    for k in range(len(fits) - 2, 0, -1):
+        taken = squares[k] - squares[k + 1]
+        chance = 2.0 * floor_N * float(np.sqrt(max(taken, 0.0) * memory / n))  # 2 Σ e Δ/n, Δ between the two fits
+        if taken > max(SURELY * chance, SPEAKS * floor_N**2):
+            out[k] = max(out[k], out[k + 1] + taken)
     return squares, out
 
 
