@@ -43,6 +43,7 @@ LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and 
 DOUBTED, LITTLE = 0.3, 0.08  # sure of a name, and of the error beyond the noise: a further cause with less is none
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
+STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
 SETTLED_S = 0.15  # after a move
 RIVALS = 4  # models of the best single causes that are kept
 
@@ -61,7 +62,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     search = Search(prepared, structure, tell, ["saturation"] if flags.saturated.any() else [])
     tell("refitting what is believed")
     base = search.base(_pads(m, believed, structure, flags.good))
-    if flags.unsure is not None:
+    if flags.outlier.any() or flags.unsure is not None:
         prepared, flags, search, path = _asked_again(m, prepared, flags, search, Path([base]))
         base = path.fits[0]
     tell("looking for causes")
@@ -192,21 +193,23 @@ def _asked_again(
     """Channel faults against the model found; where that changes which samples count, the fits are carried on.
 
     Samples that stand off in moves are strays, and no transients, where the model is right about those beside them.
+    So are a few more of a channel that has strays: transients come with most moves.
     """
     fit, full, at = path.fits[-1], prepared.full, prepared.at
     unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
-    sure = full.weight.copy()
-    sure[at[unsure[prepared.kept]]] = 0.0
-    error = full.force_N - force_at(full, fit.structure, fit.x)
-    near = (NEAR * prepared.floor_N) ** 2
-    if np.average(error**2, weights=sure) > near:
-        return prepared, flags, search, path  # against a wrong model transients look like outliers
     errors = np.full(len(m.force_N), np.nan)
-    errors[prepared.kept] = error[at]
+    errors[prepared.kept] = (full.force_N - force_at(full, fit.structure, fit.x))[at]
     known = np.isfinite(errors) & ~flags.by_itself
     outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, flags.outlier | unsure)
-    if outlier.sum() == flags.outlier.sum() and np.array_equal(outlier, flags.outlier):
+    if np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
+    further = outlier & ~(flags.outlier | unsure)
+    rest, few = known & ~(flags.outlier | unsure), STRAYS * len(holds(m.position_time_s, m.position_mm))
+    if flags.outlier.any() and further.sum() <= few:
+        rest &= ~further
+    near = (NEAR * prepared.floor_N) ** 2
+    if not rest.any() or float(np.mean(errors[rest] ** 2)) > near:
+        return prepared, flags, search, path  # against a wrong model transients look like outliers
     flags = replace(flags, outlier=outlier, unsure=None)
     beside = known & ~outlier & ~resting(m)
     if not beside.any() or float(np.mean(errors[beside] ** 2)) > near:
