@@ -5,6 +5,8 @@
 - `saturating`: by limit · (1 − e^(−set · deepest/limit)): set · deepest at first, and no more than the limit.
 - `yielding`: by set · (deepest − limit), once the deepest exceeds the limit.
 - `gradual`: towards set · deepest at a rate in time, only while pressed (the rate is scaled by depth/deepest).
+- `rebounding`: of what sinks at once a share `back` rises again at a rate in time, while nothing presses on it; `set`
+  is the mean of what sinks at once and what stays (ISO 1856 and ISO 815 measure a set after a time of recovery).
 
 `deepest` is in the probe's coordinate; the pad's depth is what is left above the sunken surface.
 
@@ -19,7 +21,7 @@ import math
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
-_DEEPEST, _SUNK = range(2)
+_DEEPEST, _SUNK, _BACK = range(3)
 
 
 @block
@@ -58,6 +60,20 @@ def gradual(dt: float, y: float, state: State, p: State) -> float:
         pressed = min(max(y / state[_DEEPEST], 0.0), 1.0)
         state[_SUNK] -= (p[0] * state[_DEEPEST] - state[_SUNK]) * math.expm1(-p[1] * pressed * dt)
     return y - state[_SUNK]
+
+
+@block
+def rebounding(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the surface; p = (set, back, rate); state: deepest, what of it stays sunk, what comes back."""
+    if y > state[_DEEPEST]:
+        sunk = p[0] / (1.0 - 0.5 * p[1]) * (y - state[_DEEPEST])
+        state[_DEEPEST] = y
+        state[_SUNK] += (1.0 - p[1]) * sunk
+        state[_BACK] += p[1] * sunk
+    elif y < state[_SUNK] + state[_BACK]:
+        state[_BACK] *= math.exp(-p[2] * dt)
+        state[_BACK] = max(state[_BACK], y - state[_SUNK], 0.0)  # it meets the probe and stops
+    return y - state[_SUNK] - state[_BACK]
 
 
 _SET = Parameter(
@@ -127,6 +143,18 @@ EFFECT = Effect(
             ),
             blocks={"depth": gradual},
             state=(0.0, 0.0),
+        ),
+        Form(
+            name="rebounding",
+            what="at once, and in part back in air",
+            parameters=(
+                _SET,
+                Parameter("back", "1", 0.0, 0.9, 0.3, "share of what sinks that comes back", starts=(0.3,)),
+                Parameter("rate", "1/s", 1e-3, 1e3, 0.2, "rate at which it comes back", starts=(0.1, 0.5)),
+            ),
+            sought=False,
+            blocks={"depth": rebounding},
+            state=(0.0, 0.0, 0.0),
         ),
     ),
 )

@@ -200,6 +200,24 @@ class TestPermanentSet:
         assert_allclose(sunk.step(1e-3, 0.5), K * (0.5 - 0.2), rtol=1e-9)
 
 
+    def test_a_part_of_it_comes_back_while_nothing_presses(self) -> None:
+        told, back, rate = 0.1, 0.4, 0.5
+        plant = Cascade(LINEAR, [active("permanent_set", "rebounding", set=told, back=back, rate=rate)]).plant()
+        at_once = told / (1 - back / 2)
+        plant.step(0.0, 0.0)
+        assert_allclose(plant.step(1.0, 1.0), K * (1 - at_once), rtol=1e-12)
+        plant.step(50.0, 1.0)  # pressed it stays as it is
+        assert_allclose(plant.step(1e-9, 0.5), K * (0.5 - at_once), rtol=1e-9)
+        for waited in (2.0, 1e3):
+            free = plant.copy()
+            for _ in range(4):
+                free.step(waited / 4, -0.2)
+            stays = at_once * (1 - back + back * math.exp(-rate * waited))
+            assert_allclose(free.step(1e-9, 0.5), K * (0.5 - stays), rtol=1e-8)
+        # What is stated is the mean of both ends.
+        assert_allclose((at_once + stays) / 2, told, rtol=1e-9)
+
+
 class TestDamage:
     def test_softer_with_all_travel(self) -> None:
         rate, band = 0.05, 0.004
