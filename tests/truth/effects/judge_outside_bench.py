@@ -24,7 +24,8 @@ def swapped_blocks(build: Build, shape: str, size: float) -> dict[str, float]:
     Every 0.8 to 1.3 s, at random. `pairs`: two blocks change places. `reversed`: three come last to first.
     """
     rng = build.rng
-    block_s, several = 0.05 * size * spread(rng, 0.8, 1.25), 2 if shape == "pairs" else 3
+    block_s, several = (0.05, 2) if shape == "pairs" else (0.028, 3)
+    block_s *= size * spread(rng, 0.8, 1.25)
     every_s, child = spread(rng, 0.8, 1.3), _child(rng)
     count = int(np.ceil(2 * (build.plant.duration_s + 10) / every_s)) + 10
     begins = np.cumsum(every_s * child.uniform(0.6, 1.4, count))

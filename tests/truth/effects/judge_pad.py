@@ -41,10 +41,10 @@ def separation(build: Build, shape: str, size: float) -> dict[str, float]:
 def adhesion(build: Build, shape: str, size: float) -> dict[str, float]:
     """P q e^{1−q} with q = 3 g/range, on the way in too; or a neck that bears 1 − e^{−t/τ} of P after a contact of t.
 
-    `smooth`: P at a third of the range. `tack`: τ of 0.3 to 2 s.
+    `smooth`: P at a third of the range. `tack`: τ of 0.2 to 1 s.
     """
     pull_off, reach = 0.1 * size * spread(build.rng, 0.7, 1.5), 0.05 * spread(build.rng, 0.6, 1.6)
-    form, grows_s = 9 if shape == "smooth" else 10, spread(build.rng, 0.3, 2.0)
+    form, grows_s = 9 if shape == "smooth" else 10, spread(build.rng, 0.2, 1.0)
     build.plant.numbers.update(adhesion_form=form, pull_off_N=pull_off, adhesion_mm=reach, adhesion_s=grows_s)
     return {"pull_off": pull_off, "range": reach}
 
@@ -233,12 +233,12 @@ def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[st
 
 @judge_shapes("viscous_damping", "squeezed_film", "forchheimer")
 def viscous_damping(build: Build, shape: str, size: float) -> dict[str, float]:
-    """c v ((H − δ_ref)/(H − δ))³, H of 2.5 to 4 depths; or c v (1 + |v|/v_0)/(1 + v_ref/v_0), v_0 of 10 to 40 mm/s.
+    """c v ((H − δ_ref)/(H − δ))³, H of 2.5 to 4 depths; or c v (1 + |v|/v_0)/(1 + v_ref/v_0), v_0 of 20 to 80 mm/s.
 
     δ_ref is half the greatest depth, v_ref is 20 mm/s.
     """
     rng, coefficient = build.rng, size * spread(build.rng, 0.005, 0.02)
-    thick, quick = build.depth_mm * float(rng.uniform(2.5, 4.0)), spread(rng, 10.0, 40.0)
+    thick, quick = build.depth_mm * float(rng.uniform(2.5, 4.0)), spread(rng, 20.0, 80.0)
     told = {"damping_form": 10, "damping_ref": quick, "damping_Ns_mm": coefficient / (1 + 20.0 / quick)}
     if shape == "squeezed_film":
         at = 1 - build.depth_mm / 2 / thick
