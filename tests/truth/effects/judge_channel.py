@@ -67,14 +67,14 @@ def stuck_samples(build: Build, shape: str, size: float) -> dict[str, float]:
     0.1 s at most. `heavy_tail`: the chance to last longer than n samples goes with 1/n.
     """
     share = 0.01 * size * float(build.rng.uniform(0.7, 1.4))
-    levels = build.rng.uniform([0.2, 0.55], [0.3, 0.75]) * build.force_N
+    levels = build.rng.uniform([0.2, 0.55], [0.3, 0.75])
     fraction = {"fraction": share}
 
     def stage(samples: Samples, rng: np.random.Generator) -> None:
         n = len(samples.force_N)
         stuck, wanted = np.zeros(n, dtype=bool), max(3, round(share * n))
         if shape == "range_relay":
-            upper = np.sum(samples.clean_N[:, None] > levels, axis=1)
+            upper = np.sum(samples.clean_N[:, None] > levels * np.max(samples.clean_N), axis=1)
             begins = np.flatnonzero(np.diff(upper) != 0) + 1
             length = int(np.clip(np.ceil(wanted / max(len(begins), 1)), 2, max(2, 0.1 * build.rate_hz)))
             # Where there are fewer samples than changes of the range, not all of them cost one.
