@@ -63,12 +63,12 @@ def test_a_filter_is_late_by_its_delay(shape, size):
     assert fine.force_N[-1] == pytest.approx(6.0, abs=1e-6)
 
 
-def test_a_line_and_a_running_mean():
+def test_a_line_and_an_exponential_mean():
     _, told, build = hidden("sensor_lag", "rc_line")
     for frequency in (5.0, 30.0, 80.0, 150.0):
         x = np.sqrt(2 * 2j * np.pi * frequency * told["time_constant"])
         assert gain(build, frequency) == pytest.approx(1 / abs(np.cosh(x)), rel=0.03)
-    _, told, build = hidden("sensor_lag", "running_mean", 2.5)
+    _, told, build = hidden("sensor_lag", "exponential_mean", 2.5)
     t = 1e-4 * np.arange(2000)
     out = build.plant.sensor[0][1](t, np.where(t > 0.0503, 1.0, 0.0))
     levels = np.unique(np.round(out, 6))

@@ -2,7 +2,7 @@
 
 Sources: dampers of oil, whose drag goes with the square of speed (Nayfeh and Mook, Nonlinear Oscillations), and mounts
 of rubber with a spring behind their damper (Ruzicka and Derby 1971); lines with resistance and capacity all along
-(Elmore 1948) and the running mean by a share of each new sample, as indicators make it (Smith, Digital Signal
+(Elmore 1948) and the mean that goes on by a share of each new sample, as indicators make it (Smith, Digital Signal
 Processing); converters that take turns, and those that count down what they have integrated (Horowitz and Hill, The Art
 of Electronics); crystals that age (Vig, Quartz Crystal Resonators and Oscillators) and clocks that lose ticks where
 interrupts are held off (Mills, Network Time Protocol); compressors that switch; gauges and bodies that warm at two
@@ -78,7 +78,7 @@ def _averaged(t: np.ndarray, force: np.ndarray, every_s: float, share: float) ->
     return y[np.floor(t / every_s + 1e-9).astype(int)]
 
 
-@judge_shapes("sensor_lag", "rc_line", "running_mean")
+@judge_shapes("sensor_lag", "rc_line", "exponential_mean")
 def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     """A line with resistance and capacity all along, 1/cosh √(2 τ s); or y + 0.4 (F − y), every half time constant.
 
@@ -89,7 +89,7 @@ def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     parts = 1 / (2 * np.arange(8.0) + 1) ** 2
 
     def stage(t, force):
-        if shape == "running_mean":
+        if shape == "exponential_mean":
             # 1.5 steps by the mean, and a half as it is held.
             return _averaged(t, force, tau / 2, 0.4)
         for part in tau * parts / parts.sum():
