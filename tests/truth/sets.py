@@ -1,4 +1,4 @@
-"""Which set a shape is of: the modules tell, `second_…`, `third_…`, `fourth_…`, `judge_…`, else `first`."""
+"""Which set a shape is of, by its module: `second_…`, `third_…`, `fourth_…`, `judge_…`, else `first`."""
 
 from .effects import EFFECTS
 from .effects.registry import _FIRST, _JUDGE, _MORE, Hide

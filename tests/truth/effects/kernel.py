@@ -9,7 +9,7 @@ stress softening by Ogden and Roxburgh (1999), exponential (Miehe 1995), Zúñig
 (2003); damage by Kachanov (1958); adhesion after Derjaguin, Muller, Toporov (1975), Johnson, Kendall, Roberts (1971),
 a capillary bridge of constant volume (Maugis 1987), van der Waals forces of a sphere and a plane (Derjaguin 1934,
 Hamaker 1937), a bilinear law of traction and separation (Alfano and Crisfield 2001); joints after Hertz (1882); damage
-by the load (Miner 1945); flow after Eyring (1936). Those of the fourth shapes are named where they are registered.
+by the load (Miner 1945); flow after Eyring (1936). Those of the later shapes are named where they are registered.
 Units: mm, N, s.
 """
 
@@ -29,9 +29,11 @@ class Numbers(NamedTuple):
     unilateral: bool = True
     stick_N: float = 0.0  # tension at which an attached surface lets go
     stick_once: bool = False
+    stick_keeps: float = 1.0  # share of that tension that is left each time it has let go
     stick_Ns: float = 0.0  # impulse of tension that a film bears
     offset_mm: float = 0.0  # surface below the zero of position
-    frame_form: int = 0  # 1 linear, 2 stiffening, 3 softer beyond a preload, 4 Hertz, 5 creeps, 6 slips
+    # 1 linear, 2 stiffening, 3 softer beyond a preload, 4 Hertz, 5 creeps, 6 slips, 7 root, 8 cubic
+    frame_form: int = 0
     frame_mm_N: float = 0.0
     frame_force_N: float = 1.0
     frame_stiff_share: float = 1.0
@@ -44,24 +46,28 @@ class Numbers(NamedTuple):
     stribeck_mm_s: float = 1.0
     bristle_Ns_mm: float = 0.0
     slide_Ns_mm: float = 0.0
-    softening_form: int = 0  # 1 exponential, 2 Ogden–Roxburgh, 3 Beatty, 4 Dorfmann–Ogden, 5 ratio, 6 linear, 7 Simo
+    softening_form: int = (
+        0  # 1 exponential, 2 Ogden–Roxburgh, 3 Beatty, 4 Dorfmann–Ogden, 5 ratio, 6 linear, 7 Simo, 8 hyperbolic
+    )
     softening_share: float = 0.0
     softening_mm: float = 1.0
     softening_Nmm: float = 1.0
+    softening_heals_s: float = 0.0  # within which the deepest point is forgotten; 0 never
     damage_form: int = (
-        0  # 1 exponential, 2 Kachanov, 3 saturating, 4 logarithmic, 5 hyperbolic, 6 by load, 7 deep, 8 power
+        0  # 1 exponential, 2 Kachanov, 3 saturating, 4 logarithmic, 5 hyperbolic, 6 by load, 7 deep, 8 power, 9 work
     )
     damage_per_mm: float = 0.0
     damage_limit: float = 1.0
     set_form: int = 0  # 1 linear, 2 saturating, 3 beyond a yield depth, 4 progressive
     set_mm_mm: float = 0.0
     set_limit_mm: float = 1.0
-    adhesion_form: int = (
-        0  # 1 exponential, 2 snaps off, 3 neck, 4 bridge, 5 van der Waals, 6 bilinear, 7 fibrils, 8 by rate
-    )
+    # 1 exponential, 2 snaps off, 3 neck, 4 bridge, 5 van der Waals, 6 bilinear, 7 fibrils, 8 by rate, 9 smooth, 10 tack
+    adhesion_form: int = 0
     pull_off_N: float = 0.0
     adhesion_mm: float = 1.0
-    damping_form: int = 0  # 1 linear, 2 with depth, 3 thinning, 4 thickening, 5 Eyring, 6 one-sided, 7 √depth, 8 load
+    adhesion_s: float = 1.0
+    # 1 linear, 2 with depth, 3 thinning, 4 thickening, 5 Eyring, 6 one-sided, 7 √depth, 8 load, 9 squeeze, 10 flow
+    damping_form: int = 0
     damping_Ns_mm: float = 0.0
     damping_ref: float = 1.0
     rate_form: int = 0  # 1 linear, 2 exponential, 3 saturating, 4 free volume, 5 up to a knee, 6 each mode its own
@@ -71,8 +77,8 @@ class Numbers(NamedTuple):
 
 
 # State: deepest raw depth, deepest depth, path of loading, surface and the one before, u, whether in contact (and
-# for how many nodes), whether attached by adhesion, probe position, whether a bond that bears once has broken, impulse
-# of the tension so far.
+# for how many nodes), whether (or how much) attached by adhesion, probe position, how often it has let go, impulse of
+# the tension so far.
 _RAW, _DEEPEST, _PATH, _S, _S1, _U, _CONTACT, _ATTACHED, _X, _BROKEN, _PULLED = range(11)
 _SLIPS = 6
 
@@ -122,6 +128,8 @@ def _elastic(p, table, depth, deepest, keep):
         elif p.softening_form == 7:  # D(δ) = D_∞ (1 − e^{−δ/d}); the law is the virgin curve, D in it
             whole = 1 + p.softening_share * math.expm1(-deepest / p.softening_mm)
             u *= whole / (1 + p.softening_share * math.expm1(-depth / p.softening_mm))
+        elif p.softening_form == 8:
+            u *= 1 - p.softening_share * below / (below + p.softening_mm)
         else:
             u *= math.exp(-p.softening_share * math.sqrt(below / p.softening_mm))
     return u
@@ -132,7 +140,7 @@ def _kept(p, path):
     """Share of the stiffness that is left after a path of loading, mm."""
     if p.damage_form == 0:
         return 1.0
-    if p.damage_form == 1 or p.damage_form == 6 or p.damage_form == 7:
+    if p.damage_form in (1, 6, 7, 9):
         return math.exp(-p.damage_per_mm * path)
     if p.damage_form == 2:  # dD/dλ = r / (1 − D)²
         return max(1 - 3 * p.damage_per_mm * path, 0.01) ** (1 / 3)
@@ -175,6 +183,10 @@ def _damped(p, table, speed, depth):
         return p.damping_Ns_mm * speed * math.sqrt(depth / p.damping_ref)
     if p.damping_form == 8:
         return p.damping_Ns_mm * speed * _law(table, depth, p.table_mm) / p.damping_ref
+    if p.damping_form == 9:
+        return p.damping_Ns_mm * speed / max(1 - depth / p.damping_ref, 0.2) ** 3
+    if p.damping_form == 10:
+        return p.damping_Ns_mm * speed * (1 + abs(speed) / p.damping_ref)
     exponent = 0.7 if p.damping_form == 3 else 1.3
     return math.copysign(p.damping_Ns_mm * p.damping_ref * (abs(speed) / p.damping_ref) ** exponent, speed)
 
@@ -227,6 +239,13 @@ def _deflection(p, force, late, new):
     if p.frame_form == 6:
         new[0] = min(max(late[0], force - p.frame_force_N), force + p.frame_force_N)
         return p.frame_mm_N * ((1 - p.frame_late_share) * force + p.frame_late_share * new[0])
+    if p.frame_form == 7:
+        pressed = 2 * p.frame_force_N * (math.sqrt(1 + abs(force) / p.frame_force_N) - 1)
+        bent = (1 - p.frame_stiff_share) * abs(force) + p.frame_stiff_share * pressed
+        return math.copysign(p.frame_mm_N * bent, force)
+    if p.frame_form == 8:  # y + y³ = F/F_0
+        y = 2 / math.sqrt(3.0) * math.sinh(math.asinh(1.5 * math.sqrt(3.0) * force / p.frame_force_N) / 3)
+        return p.frame_mm_N * p.frame_force_N * y
     return p.frame_mm_N * force
 
 
@@ -254,12 +273,17 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
     depth = raw - _sunk(p, new[_RAW])
     inner = max(depth, 0.0)
     was = state[_CONTACT] > 0
-    new[_DEEPEST] = max(state[_DEEPEST], depth)
+    deepest = state[_DEEPEST]
+    if p.softening_heals_s > 0:
+        deepest = inner + (deepest - inner) * math.exp(-p.step_s / p.softening_heals_s)
+    new[_DEEPEST] = max(deepest, depth)
     way = max(inner - state[_S], 0.0)
     if p.damage_form == 6:
         way *= (inner + state[_S]) / p.damage_limit
     elif p.damage_form == 7:
         way = max(inner - max(state[_S], p.damage_limit), 0.0)
+    elif p.damage_form == 9:
+        way *= _law(table, 0.5 * (inner + state[_S]), p.table_mm) / p.damage_limit
     new[_PATH] = state[_PATH] + way
     keep = gain * _kept(p, new[_PATH])
     u = _elastic(p, table, inner, new[_DEEPEST], keep)
@@ -275,9 +299,10 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
     force = held * u - remembered + _damped(p, table, speed, inner)
     new[_S] = inner
     bears = was and not (p.stick_once and state[_BROKEN] > 0)
+    tension = p.stick_N * p.stick_keeps ** state[_BROKEN]
     new[_PULLED] = state[_PULLED] + p.step_s * max(-force, 0.0) if bears and force < 0 else 0.0
-    touching = (not p.unilateral) or force >= (-p.stick_N if bears else -1e-13) or 0 < new[_PULLED] < p.stick_Ns
-    new[_BROKEN] = 1.0 if was and not touching else state[_BROKEN]
+    touching = (not p.unilateral) or force >= (-tension if bears else -1e-13) or 0 < new[_PULLED] < p.stick_Ns
+    new[_BROKEN] = state[_BROKEN] + (1.0 if was and not touching else 0.0)
     if touching:
         new[_CONTACT] = state[_CONTACT] + 1
     else:
@@ -294,7 +319,9 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
     new[_ATTACHED] = state[_ATTACHED]
     if p.adhesion_form:
         gap = 0.0 if touching and depth > 0 else max(new[_S] - depth, 0.0)
-        if gap == 0.0:
+        if gap == 0.0 and p.adhesion_form == 10:
+            new[_ATTACHED] = 1 - (1 - state[_ATTACHED]) * math.exp(-p.step_s / p.adhesion_s)
+        elif gap == 0.0:
             new[_ATTACHED] = 1.0
         elif gap > p.adhesion_mm:
             new[_ATTACHED] = 0.0
@@ -302,6 +329,8 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
             force -= p.pull_off_N * math.exp(-gap / p.adhesion_mm)
         elif p.adhesion_form == 5:
             force -= p.pull_off_N / (1 + gap / p.adhesion_mm) ** 2
+        elif p.adhesion_form == 9:
+            force -= p.pull_off_N * 3 * gap / p.adhesion_mm * math.exp(1 - 3 * gap / p.adhesion_mm)
         elif new[_ATTACHED] > 0 and p.adhesion_form == 7:
             share = gap / p.adhesion_mm
             force -= p.pull_off_N * max(min(share / 0.15, 1.0, (1 - share) / 0.3), 0.0)
@@ -315,7 +344,7 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
         elif new[_ATTACHED] > 0 and p.adhesion_form == 2:
             force -= p.pull_off_N * (1 - 0.6 * gap / p.adhesion_mm)
         elif new[_ATTACHED] > 0:
-            force -= p.pull_off_N * math.sin(0.5 * math.pi * gap / p.adhesion_mm)
+            force -= new[_ATTACHED] * p.pull_off_N * math.sin(0.5 * math.pi * gap / p.adhesion_mm)
     new[_X] = x
     return force
 
