@@ -78,7 +78,7 @@ SHOWN: Mapping[tuple[str, str], Mapping[str, float]] = {
     ("saturation", "soft"): {"limit": 5.0},
     ("clock_skew", "linear"): {"skew": 1000.0},
     ("clock_skew", "offset"): {"skew": 1000.0, "offset": -0.01},
-    ("clock_skew", "ageing"): {"skew": 1000.0, "doubling": 10.0},
+    ("clock_skew", "ageing"): {"skew": 1000.0, "growth": 0.1, "at_time": 10.0},
 }
 """Numbers in the pictures where the typical ones would show little."""
 

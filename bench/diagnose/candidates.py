@@ -89,6 +89,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     elif p.name == "moved_at":
         upper = min(upper, reach.span_s)
         starts, default = tuple(share * reach.span_s for share in MOVED_AT), 0.5 * reach.span_s
+    elif p.name == "at_time":
+        default = 0.5 * reach.span_s
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm
     elif p.name == "at_force":

@@ -4,7 +4,8 @@ Over the time T since the first force sample the force clock counts T (1 + skew 
 
 - `linear`: the clocks agree at the first force sample.
 - `offset`: there they differ by `offset` already (force clock ahead). Without a skew it is a delay.
-- `ageing`: the skew grows by itself over `doubling` seconds, as a quartz that warms up.
+- `ageing`: the skew grows or fades evenly, as of a quartz that warms up: skew · (1 + growth (t − at_time)). `at_time` is
+  a choice and not fitted: the middle of the data, so that `skew` is its mean over them.
 
 A single stamp without an array around it (a simulated device that is read out) counts from time 0.
 
@@ -35,7 +36,7 @@ def ageing(values: Mapping[str, float], stamp_s: Array) -> Array:
     """When forces stamped `stamp_s` were felt, s."""
     origin = _origin(stamp_s)
     since = stamp_s - origin
-    gained = 1e-6 * values["skew"] * since * (1.0 + 0.5 * since / values["doubling"])
+    gained = 1e-6 * values["skew"] * since * (1.0 + values["growth"] * (0.5 * since - values["at_time"]))
     return np.asarray(stamp_s - gained)
 
 
@@ -71,10 +72,11 @@ EFFECT = Effect(
         ),
         Form(
             name="ageing",
-            what="ever further apart",
+            what="ever faster or slower apart",
             parameters=(
                 _SKEW,
-                Parameter("doubling", "s", 10.0, 1e6, 100.0, "time in which the skew doubles", starts=(30.0, 300.0)),
+                Parameter("growth", "1/s", -1.0, 1.0, 0.0, "relative growth of the skew", starts=(-0.02, 0.02)),
+                Parameter("at_time", "s", 0.0, 1e6, 30.0, "time since the first sample when it holds", fixed=True),
             ),
             time_shift=ageing,
             sought=False,
