@@ -41,6 +41,7 @@ TOLD = 0.002  # of the noise power
 LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and a further cause must take of what was
 # held out
 DOUBTED, LITTLE = 0.3, 0.08  # sure of a name, and of the error beyond the noise: a further cause with less is none
+NAMED, TRACE = 0.6, 0.05  # the same, of a further cause where what it and all others leave is next to nothing
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
@@ -79,7 +80,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     while len(fits) > 1:
         needless = _needless(prepared, fits, squares, excess, apart)
         if needless is None:
-            needless = _doubtful(path, fits, excess, apart)
+            needless = _doubtful(path, fits, excess, apart, floor)
         if needless is None:
             break
         fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + needless), base)
@@ -117,14 +118,20 @@ def _needless(
     return best if later > HARM * rest[best] else None
 
 
-def _doubtful(path: Path, fits: list[Fit], excess: list[float], apart: float) -> int | None:
+def _doubtful(path: Path, fits: list[Fit], excess: list[float], apart: float, floor_N: float) -> int | None:
     """Number of a further cause whose name is hardly sure, and that takes little, and less than is left: what left the
-    one may have left the other."""
+    one may have left the other. Or of one that takes next to nothing, and less than the noise, under a name that may be
+    another, where the rest is as good as explained without it: no shape is exact, and what it misses looks like
+    something."""
     named = [c.id for c in fits[-1].structure.causes[len(fits[0].structure.causes) :]]
     for k in range(len(fits) - 1, 1, -1):
         _, confidence, kind = sureness(path, named[k - 1], named)
         taken = excess[k - 1] - excess[k]
-        if max(confidence, kind) < DOUBTED and taken < min(LITTLE * (excess[0] + apart), excess[-1]):
+        sure = max(confidence, kind)
+        if sure < DOUBTED and taken < min(LITTLE * (excess[0] + apart), excess[-1]):
+            return k - 1
+        trace = TRACE * excess[0]
+        if sure < NAMED and taken < min(trace, floor_N**2) and taken + excess[-1] < 2.0 * trace:
             return k - 1
     return None
 
