@@ -74,7 +74,7 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     if p.unit == "1/s" and p.logarithmic:
         lower, upper = max(lower, 0.3 / reach.span_s), min(upper, 0.6 / reach.sample_s)
     elif p.unit == "Hz":
-        lower, upper = max(lower, 2.0 / reach.span_s), min(upper, 0.45 / reach.sample_s)
+        lower, upper = max(lower, 2.0 / reach.span_s), min(upper, 0.9 / reach.sample_s)
     elif p.unit == "s" and p.logarithmic:
         upper = min(upper, 3.0 * reach.span_s)
     elif p.name == "period":

@@ -36,6 +36,7 @@ ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which th
 WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
+LIMIT = 24.0  # Δχ² by which one with a number at its bound must be better: it is another cause's limit
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexplained: so little more is none
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
@@ -334,9 +335,9 @@ class Search:
         cause = fit.structure.causes[-1]
         at = fit.structure.of_cause(len(fit.structure.causes) - 1)
         x, lower, upper = fit.x[at], fit.structure.lower[at], fit.structure.upper[at]
-        edge = float(np.sum((x <= lower + 1e-9) | (x >= upper - 1e-9)))  # a shape at its bound is another one's limit
+        edge = float(np.sum((x <= lower + 1e-9) | (x >= upper - 1e-9)))
         unusual = 0.0 if cause.form.name == cause.effect.forms[0].name else LATER * self.prepared.memory
-        unusual += edge * LATER * self.prepared.memory
+        unusual += edge * LIMIT * self.prepared.memory
         return Trial(cause, fit, fit.chi2 + self._penalty(fit) + unusual)
 
     def _penalty(self, fit: Fit) -> float:
