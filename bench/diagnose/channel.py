@@ -45,6 +45,8 @@ BULK = 9.0  # medians of the size: within some six deviations of white noise
 DOUBT = 2.0  # of the logarithm of the likelihood of a tail: two standard deviations
 DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
 FALSE_SHARE, SEVERAL = 0.02, 10  # of values beyond the limit that may be noise, where at least so many lie there
+AROUND_S = 0.02  # either side of a sample, where its speed and acceleration are looked at
+TOGETHER, ONE_WAY = 0.5, 0.5  # of strays, that have another beside them, or go with the motion: fewer do
 RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data; or chance of repeats
 
 
@@ -416,3 +418,20 @@ def standing_off(residual: Array, good: Mask, suspect: Mask) -> Mask:
     reach = 3.0 * np.maximum(calm - float(np.median(calm)), 0.0)
     mask[index[_beyond(np.abs(e - middle), limits, reach)]] = True
     return mask
+
+
+def strays(m: Measurement, errors: Array, off: Mask) -> bool:
+    """Whether samples `off` (m,) stand off alone, and up or down as it comes: what a motion makes lasts, or goes with
+    its speed or its acceleration. `errors` (m,): what a model leaves of the force, N."""
+    at = np.flatnonzero(off)
+    if len(at) < SEVERAL:
+        return False
+    beside = off[np.maximum(at - 1, 0)] | off[np.minimum(at + 1, len(off) - 1)]
+    x = [
+        np.interp(m.force_time_s[at] + shift, m.position_time_s, m.position_mm) for shift in (-AROUND_S, 0.0, AROUND_S)
+    ]
+    sign = np.sign(errors[at])
+    with_speed, with_acceleration = (
+        abs(float(np.mean(sign * np.sign(way)))) for way in (x[2] - x[0], x[2] - 2.0 * x[1] + x[0])
+    )
+    return float(np.mean(beside)) < TOGETHER and max(with_speed, with_acceleration) < ONE_WAY

@@ -16,7 +16,7 @@ from bench.recording.types import Measurement
 from sim.model import Model
 from sim.pad import Pad
 
-from .channel import Faults, faults, not_of_the_motion, resting, standing_off
+from .channel import Faults, faults, not_of_the_motion, resting, standing_off, strays
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS
@@ -200,7 +200,8 @@ def _asked_again(
     """Channel faults against the model found; where that changes which samples count, the fits are carried on.
 
     Samples that stand off in moves are strays, and no transients, where the model is right about those beside them.
-    So are a few more of a channel that has strays: transients come with most moves.
+    So are a few more of a channel that has strays, for transients come with most moves; and more than a few that are
+    not as the motion is.
     """
     fit, full, at = path.fits[-1], prepared.full, prepared.at
     unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
@@ -212,7 +213,7 @@ def _asked_again(
         return prepared, flags, search, path
     further = outlier & ~(flags.outlier | unsure)
     rest, few = known & ~(flags.outlier | unsure), STRAYS * len(holds(m.position_time_s, m.position_mm))
-    if flags.outlier.any() and further.sum() <= few:
+    if (flags.outlier.any() and further.sum() <= few) or strays(m, errors, further | unsure):
         rest &= ~further
     near = (NEAR * prepared.floor_N) ** 2
     if not rest.any() or float(np.mean(errors[rest] ** 2)) > near:

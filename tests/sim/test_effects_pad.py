@@ -199,7 +199,6 @@ class TestPermanentSet:
         sunk.step(100.0, -1.0)
         assert_allclose(sunk.step(1e-3, 0.5), K * (0.5 - 0.2), rtol=1e-9)
 
-
     def test_a_part_of_it_comes_back_while_nothing_presses(self) -> None:
         told, back, rate = 0.1, 0.4, 0.5
         plant = Cascade(LINEAR, [active("permanent_set", "rebounding", set=told, back=back, rate=rate)]).plant()

@@ -1,0 +1,121 @@
+"""Which steps the search takes from cause to cause, by fits that are made up: an id and a χ²."""
+
+from __future__ import annotations
+
+import importlib
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from bench.diagnose import verdict
+from bench.diagnose.evidence import Evidence
+from bench.diagnose.search import Search
+
+module = importlib.import_module("bench.diagnose.search")
+NOISE = 1000.0
+
+
+def fit(chi2: float, *ids: str) -> Any:
+    return SimpleNamespace(chi2=chi2, structure=SimpleNamespace(causes=tuple(SimpleNamespace(id=i) for i in ids)))
+
+
+class Told(Search):
+    """A search that is told what it finds: by the ids found so far, the candidates with their χ², best first."""
+
+    def __init__(self, ranks: dict[tuple[str, ...], dict[str, float]], together: Any) -> None:
+        self.prepared: Any = SimpleNamespace(memory=1.0)
+        self.samples, self.ranks, self.together, self.exchanges = NOISE, ranks, together, 0
+
+    @property
+    def expected(self) -> float:
+        return NOISE
+
+    @property
+    def effective(self) -> float:
+        return NOISE
+
+    def ranked(self, now: Any, only: Any = None, least: float = 0.0) -> list[Any]:
+        ids = tuple(c.id for c in now.structure.causes)
+        found = self.ranks.get(ids, {})
+        return [SimpleNamespace(id=i, fit=fit(chi2, *ids, i), score=chi2) for i, chi2 in found.items()]
+
+    def settled(self, now: Any, joined: Any) -> Any:
+        return now
+
+    def recurved(self, now: Any) -> Any:
+        return now
+
+    def exchanged(self, path: Any) -> Any:
+        self.exchanges += 1
+        return self.together
+
+    def judge(self, before: Any, after: Any, base: Any) -> Evidence:
+        delta = before.chi2 - after.chi2
+        share, of_left = delta / (base.chi2 - NOISE), delta / max(before.chi2 - NOISE, delta, 1e-9)
+        return Evidence(delta, delta, 1, 15.0, share, delta / NOISE, of_left, before is base)
+
+
+@pytest.fixture(autouse=True)
+def all_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "believable", lambda fit, prepared: True)
+
+
+RANKS = {(): {"adhesion": 20e3, "cogging": 90e3}, ("adhesion",): {"force_drift": 12e3}}
+
+
+def named(search: Search) -> list[str]:
+    return [c.id for c in search.path(fit(3e6)).fits[-1].structure.causes]
+
+
+def test_where_a_second_cause_takes_little_but_much_is_left_two_others_may_stand_in_the_place_of_the_first():
+    """8,000 of 3 million is too little to pay, but with drift beside it cogging does what neither adhesion can."""
+    search = Told(RANKS, fit(1100, "force_drift", "cogging"))
+    assert named(search) == ["force_drift", "cogging"] and search.exchanges > 0
+
+
+def test_two_that_do_no_better_together_are_not_taken():
+    assert named(Told(RANKS, fit(11e3, "force_drift", "cogging"))) == ["adhesion"]
+
+
+def test_where_next_to_nothing_is_left_no_two_are_tried():
+    search = Told(
+        {(): {"adhesion": 1010.0}, ("adhesion",): {"force_drift": 1005.0}}, fit(900.0, "force_drift", "cogging")
+    )
+    assert named(search) == ["adhesion"] and search.exchanges == 0
+
+
+def squares(monkeypatch: pytest.MonkeyPatch, values: list[float]) -> list[float]:
+    """Excesses over a noise of 1 N², whose own doubt is large, of fits with these held-out squares."""
+    fits: list[Any] = [SimpleNamespace(free=3, square=v) for v in values]
+    monkeypatch.setattr(verdict, "held_out_square", lambda prepared, fit: fit.square)
+    monkeypatch.setattr(verdict, "_square_std", lambda prepared, fit: 0.03)
+    prepared: Any = SimpleNamespace(
+        floor_square_std=0.03,
+        colour=SimpleNamespace(memory=1.0),
+        full=SimpleNamespace(weight=SimpleNamespace(sum=lambda: 10_000.0)),
+    )
+    return verdict.excesses(prepared, fits, 1.0)[1]
+
+
+def test_what_a_later_fit_surely_takes_is_there_however_doubtful_the_floor_is(monkeypatch):
+    assert squares(monkeypatch, [2.0, 1.03, 1.00]) == pytest.approx([1.0, 0.03, 0.0])
+    # a hundredth of the noise is none, and within the floor's doubt it stays nothing
+    assert squares(monkeypatch, [2.0, 1.03, 1.025]) == pytest.approx([1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("excess", "sure", "goes"),
+    [
+        ([4.0, 0.1, 0.0], 0.4, 1),  # a trace under an unsure name
+        ([4.0, 0.1, 0.0], 0.9, None),  # the name is sure
+        ([4.0, 0.3, 0.0], 0.4, None),  # more than a trace
+        ([4.0, 0.5, 0.4], 0.4, None),  # much is left beside it
+        ([400.0, 3.0, 0.0], 0.4, None),  # more than the noise
+    ],
+)
+def test_a_further_cause_that_takes_next_to_nothing_under_an_unsure_name_goes(monkeypatch, excess, sure, goes):
+    diagnosis = importlib.import_module("bench.diagnose.diagnose")
+    monkeypatch.setattr(diagnosis, "sureness", lambda path, name, named: ([], sure, sure))
+    fits: list[Any] = [fit(0.0, *("backlash", "friction")[:k]) for k in range(3)]
+    assert diagnosis._doubtful(None, fits, excess, 0.0, 1.0) == goes

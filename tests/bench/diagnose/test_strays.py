@@ -1,0 +1,48 @@
+"""Samples that stand off where moves begin and end: strays of the channel, or what the motion makes. Data of the
+independent simulator; rates over consecutive seeds."""
+
+from __future__ import annotations
+
+import pytest
+
+from bench.diagnose import Diagnosis, diagnose
+from sim.model import Model
+from tests.bench.diagnose.small import measurement
+from tests.truth.cases import Case, draw_case
+
+SEEDS = range(4)
+
+
+def said(id: str, shape: str, size: float, protocol: str, rate_Hz: float) -> list[tuple[Case, Diagnosis]]:
+    """Cases and their diagnoses."""
+    cases = [
+        draw_case(seed, (id,), size, shape, protocol=protocol, rate_hz=rate_Hz, jitter="none", own_clock=False)
+        for seed in SEEDS
+    ]
+    return [(c, diagnose(measurement(c), Model.from_dict(c.believed))) for c in cases]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("shape", "size", "rate_Hz"), [("switching", 1.0, 300.0), ("lost_character", 2.5, 120.0)])
+def test_strays_in_moves_are_told_once_the_model_is_right_beside_them(shape, size, rate_Hz):
+    right = 0
+    for case, found in said("outliers", shape, size, "random_steps", rate_Hz):
+        true, flagged = case.truth.flags["outlier"], found.flags["outliers"]
+        hit = (true & flagged).sum()
+        right += hit >= 0.9 * true.sum() and hit >= 0.9 * flagged.sum() and [c.id for c in found.causes] == ["outliers"]
+    assert right >= len(SEEDS) - 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("id", "shape"), [("inertia", "rigid"), ("resonance", "second_order")])
+def test_what_a_motion_makes_in_a_sample_or_two_is_no_stray(id, shape):
+    for _, found in said(id, shape, 1.0, "staircase", 120.0):
+        assert found.causes and found.causes[0].id == id
+        assert found.flags["outliers"].sum() <= 1
+
+
+@pytest.mark.slow
+def test_a_mode_beyond_half_the_rate_of_sampling_is_found():
+    """Some 110 to 200 Hz at 200 samples a second; the fastest may be too little to be seen."""
+    found = [d.causes[0].id if d.causes else "" for _, d in said("resonance", "second_order", 0.15, "rich", 200.0)]
+    assert found.count("resonance") >= len(SEEDS) - 1
