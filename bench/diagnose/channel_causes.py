@@ -32,7 +32,7 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
     n = max(len(at), 1)
     out = []
     if prepared.hum is not None and prepared.hum.of_the_mains:
-        hum = prepared.hum.force_N((prepared.full.time_s - prepared.full.time_s[0])[at][counted])
+        hum = prepared.hum_N[at][counted]
         id_, form, numbers = described(final, len(final.structure.causes) - 1)
         out.append(_named(id_, form, numbers, float(np.sum(hum**2)) / n))
     masks = {"saturation": flags.saturated, "stuck_samples": flags.stuck, "outliers": flags.outlier}
@@ -82,7 +82,10 @@ def hum_cause(line: Line) -> Cause:
     """The effect that makes the line."""
     hum = effect("mains_hum")
     values = {"amplitude": line.amplitude_N, "frequency": line.frequency_Hz, "phase": line.phase_rad}
-    if line.ratio > 0.0:
-        third = {"ratio": line.ratio, "third_phase": line.third_phase_rad}
+    third = {"ratio": line.ratio, "third_phase": line.third_phase_rad} if line.ratio > 0.0 else {}
+    if line.growth_1_N != 0.0:
+        own = {"growth": line.growth_1_N, "at_force": line.at_N}
+        return cause_of(hum, hum.form("loaded_harmonics" if third else "loaded"), values | third | own)
+    if third:
         return cause_of(hum, hum.form("harmonics"), values | third)
     return cause_of(hum, hum.form("sine"), values)

@@ -200,6 +200,15 @@ class TestBiasDriftHum:
         spectrum = np.abs(np.fft.rfft(both)) / 2000
         assert_allclose(spectrum[[200, 400, 600]], [0.1, 0.0, 0.03], atol=1e-9)
 
+    def test_hum_that_grows_with_the_load(self) -> None:
+        t = np.arange(4000) * 1e-3
+        numbers = {"amplitude": 0.1, "growth": 0.25, "at_force": 2.0}
+        for form, third in (("loaded", 0.0), ("loaded_harmonics", 0.03)):
+            for load, swells in ((0.0, 0.5), (2.0, 1.0), (6.0, 2.0)):
+                out = sense(active("mains_hum", form, frequency=50.0, **numbers), t, np.full(t.size, load)) - load
+                spectrum = np.abs(np.fft.rfft(out)) / 2000
+                assert_allclose(spectrum[[200, 400, 600]], [0.1 * swells, 0.0, third * swells], atol=1e-9)
+
 
 class TestLimitsAndFaults:
     force = np.linspace(-10.0, 10.0, 401)

@@ -149,6 +149,42 @@ def test_a_line_is_of_the_mains_by_its_frequency_alone(frequency_Hz, sample_s, m
     assert line.of_the_mains is mains
 
 
+def _holds(stamp_s: np.ndarray, error_N: np.ndarray, length: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Parts as of holds of so many samples with nothing between them, and no curve taken out."""
+    cuts = range(0, len(stamp_s) - length + 1, length)
+    return [(stamp_s[k : k + length], error_N[k : k + length], np.zeros((length, 0))) for k in cuts]
+
+
+@pytest.mark.parametrize(("frequency_Hz", "rate_Hz", "jitter"), [
+    (60.0, 114.0, 0.02), (60.0, 114.0, 0.0), (49.98, 103.0, 0.0), (60.0, 100.0, 0.02), (50.03, 1000.0, 0.1),
+    (100.0, 130.0, 0.02),
+])  # fmt: skip
+def test_a_line_is_found_at_the_mains_own_frequency_however_it_is_folded(frequency_Hz, rate_Hz, jitter):
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        t = (np.arange(4000) + jitter * rng.standard_normal(4000)) / rate_Hz
+        t -= t[0]
+        e = 0.02 * np.sin(2 * np.pi * frequency_Hz * t + 0.3) + 0.01 * rng.standard_normal(len(t))
+        line = hum.find(0.0, _holds(t, e, 500), t, e)
+        assert line is not None
+        assert line.frequency_Hz == pytest.approx(frequency_Hz, abs=0.01)
+        assert line.amplitude_N == pytest.approx(0.02, rel=0.05)
+        assert line.growth_1_N == 0.0
+
+
+def test_a_line_that_grows_with_the_load_is_stated_at_the_mean_force():
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        t = np.arange(8000) / 500.0
+        load = np.repeat([0.0, 2.0, 4.0, 10.0], 2000)
+        e = 0.02 * (0.7 + 0.1 * load) * np.sin(2 * np.pi * 50.0 * t) + 0.01 * rng.standard_normal(len(t))
+        line = hum.find(0.0, _holds(t, e, 1000), t, load + e)
+        assert line is not None
+        assert line.amplitude_N == pytest.approx(0.02 * 1.1, rel=0.05)
+        assert line.growth_1_N * line.amplitude_N == pytest.approx(0.002, rel=0.15)
+        assert np.std(e - line.force_N(t, load)) == pytest.approx(0.01, rel=0.03)
+
+
 def test_what_sways_at_a_frequency_of_its_own_is_seen_and_noise_is_not():
     for seed in SEEDS:
         rng = np.random.default_rng(seed)
