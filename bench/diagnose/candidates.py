@@ -80,6 +80,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     elif p.name == "period":
         # some levels of depth are met by any ripple that is short enough
         lower, upper = max(lower, SHORTEST * longest_mm), min(upper, longest_mm)
+    elif p.name == "range":  # a pull that reaches further than the whole way is there always: a bias
+        upper = min(upper, reach.travel_mm)
     elif p.name == "reach":
         default = reach.depth_mm
     elif p.name == "moved_at":

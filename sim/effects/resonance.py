@@ -5,11 +5,15 @@ The damping ratio ends at 0.5: beyond, a second-order low-pass has next to no pe
 - `low_pass`: all of the force passes ω²/(s² + 2ζω s + ω²).
 - `partial`: a share of it does, the rest passes as it is: a mode of part of the structure, which adds a ringing at each
   sudden change and nothing to what is slow.
+- `transmitted`: the damper stands beside the spring and bears too, (2ζω s + ω²)/(s² + 2ζω s + ω²). It comes no later
+  than a ramp in the end.
+- `amplifier`: a pole at `ratio` times ω comes after the mode, as of an amplifier whose bandwidth is not far above it.
 
 Exact for a force that is linear between samples, at any spacing.
 
 Reference: W. T. Thomson, Theory of Vibration with Applications, 4th ed., Prentice Hall, 1993; E. O. Doebelin,
-Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3.
+Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3; J. P. Den Hartog, Mechanical
+Vibrations, 4th ed., McGraw-Hill, 1956, section 2.12 (transmissibility).
 """
 
 from __future__ import annotations
@@ -17,10 +21,11 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.linear import first_order
 from sim.effects.linear import low_pass as exact
 from sim.jit import State, block
 
-_Y, _SPEED, _LAST, _STARTED = range(4)
+_Y, _SPEED, _LAST, _STARTED, _AFTER = range(5)
 
 
 @block
@@ -49,6 +54,40 @@ def partial(dt: float, u: float, state: State, p: State) -> float:
     state[_SPEED] = speed
     state[_LAST] = u
     return u + p[2] * (y - u)
+
+
+@block
+def transmitted(dt: float, u: float, state: State, p: State) -> float:
+    """Force that spring and damper of the mode pass on; p = (frequency, damping_ratio)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_LAST] = u
+    omega = 2.0 * math.pi * p[0]
+    y, speed = exact(dt, state[_Y], state[_SPEED], state[_LAST], u, omega, p[1])
+    state[_Y] = y
+    state[_SPEED] = speed
+    state[_LAST] = u
+    return y + 2.0 * p[1] / omega * speed
+
+
+@block
+def amplifier(dt: float, u: float, state: State, p: State) -> float:
+    """Force after the mode and a pole at ratio · ω, by partial fractions; p = (frequency, damping_ratio, ratio)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_LAST] = u
+        state[_AFTER] = u
+    omega = 2.0 * math.pi * p[0]
+    y, speed = exact(dt, state[_Y], state[_SPEED], state[_LAST], u, omega, p[1])
+    after = first_order(dt, state[_AFTER], state[_LAST], u, 1.0 / (p[2] * omega))
+    state[_Y] = y
+    state[_SPEED] = speed
+    state[_AFTER] = after
+    state[_LAST] = u
+    share = 1.0 / (1.0 - 2.0 * p[1] * p[2] + p[2] * p[2])
+    return y + share * (after - y - p[2] / omega * speed)
 
 
 _FREQUENCY = Parameter(
@@ -92,6 +131,26 @@ EFFECT = Effect(
             sought=False,
             blocks={"sensor": partial},
             state=(0.0,) * 4,
+        ),
+        Form(
+            name="transmitted",
+            what="spring and damper of the mode pass the force",
+            parameters=(_FREQUENCY, _DAMPING),
+            sought=False,
+            blocks={"sensor": transmitted},
+            state=(0.0,) * 4,
+        ),
+        Form(
+            name="amplifier",
+            what="the mode, and a first-order lag after it",
+            parameters=(
+                _FREQUENCY,
+                _DAMPING,
+                Parameter("ratio", "1", 0.5, 20.0, 3.0, "corner of the lag over the natural frequency"),
+            ),
+            sought=False,
+            blocks={"sensor": amplifier},
+            state=(0.0,) * 5,
         ),
     ),
 )

@@ -4,6 +4,8 @@ In all forms `time_constant` is how far the output comes behind a ramp in the en
 value. Each is exact for a force that is linear between samples, at any spacing.
 
 - `first_order`: 1/(1 + τs).
+- `partly`: 1 − σ + σ/(1 + τs/σ), a share σ of the force late and the rest at once: lag and lead of a divider with a
+  capacitor, (1 + (1 − σ)τs/σ)/(1 + τs/σ).
 - `two_poles`: critically damped, 1/(1 + τs/2)².
 - `butterworth`: second order without a peak, damping ratio 1/√2, ω = √2/τ.
 - `moving_average`: the mean over the last 2τ.
@@ -21,9 +23,9 @@ import math
 from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.linear import first_order as lagged
 from sim.effects.linear import low_pass
 from sim.jit import State, block
-from sim.kernel import ramp_gain
 
 _Y, _LAST, _STARTED, _Y2 = range(4)
 
@@ -34,13 +36,24 @@ def first_order(dt: float, u: float, state: State, p: State) -> float:
     if state[_STARTED] == 0.0 or p[0] <= 0.0:
         state[_STARTED] = 1.0
         state[_Y] = u
-    elif dt > 0.0:
-        x = dt / p[0]
-        gain = ramp_gain(x)
-        decay = 1.0 - x * gain
-        state[_Y] = decay * state[_Y] + (gain - decay) * state[_LAST] + (1.0 - gain) * u
+    else:
+        y = lagged(dt, state[_Y], state[_LAST], u, p[0])
+        state[_Y] = y
     state[_LAST] = u
     return state[_Y]
+
+
+@block
+def partly(dt: float, u: float, state: State, p: State) -> float:
+    """A share passes a lag of τ/share, the rest at once; p = (time_constant, share)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+    else:
+        y = lagged(dt, state[_Y], state[_LAST], u, p[0] / p[1])
+        state[_Y] = y
+    state[_LAST] = u
+    return u + p[1] * (state[_Y] - u)
 
 
 @block
@@ -170,6 +183,17 @@ EFFECT = Effect(
             what="one pole",
             parameters=(_TIME_CONSTANT,),
             blocks={"sensor": first_order},
+            state=(0.0,) * 3,
+        ),
+        Form(
+            name="partly",
+            what="one pole for a share of the force, the rest at once",
+            parameters=(
+                _TIME_CONSTANT,
+                Parameter("share", "1", 0.1, 1.0, 0.7, "share of the force that comes late", starts=(0.4, 0.7)),
+            ),
+            sought=False,
+            blocks={"sensor": partly},
             state=(0.0,) * 3,
         ),
         Form(

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 
-from sim.effects import Active
+from sim.effects import Active, effect
 from sim.effects.draws import uniform
 from sim.pad import Cascade
 from tests.sim.effect_tools import AIR, LINEAR, SOFT, K, active, simulate
@@ -28,6 +28,7 @@ def sample(effect: Active, force: Array) -> Array:
     return np.array([plant.sample(1e-3, float(f)) for f in force])
 
 
+LAGS = [form.name for form in effect("sensor_lag").forms]
 EVEN = np.arange(3000) * 1e-3
 UNEVEN = np.cumsum(np.random.default_rng(3).uniform(0.0, 4e-3, 3000))
 
@@ -66,7 +67,7 @@ class TestClockSkew:
 
 
 class TestSensorLag:
-    @pytest.mark.parametrize("form", ["first_order", "two_poles", "butterworth", "moving_average", "decimator"])
+    @pytest.mark.parametrize("form", LAGS)
     @pytest.mark.parametrize("t", [EVEN, UNEVEN], ids=["even", "uneven"])
     def test_behind_a_ramp_by_the_time_constant(self, form: str, t: Array) -> None:
         tau = 0.03
@@ -79,7 +80,9 @@ class TestSensorLag:
         h = tau / 2
         second = s - 2 * h + (2 * h + s) * np.exp(-s / h)
         mean = np.where(s < 2 * tau, s**2 / (4 * tau), s - tau)
-        for form, expected in (("first_order", first), ("two_poles", second), ("moving_average", mean)):
+        part = s - tau * (1 - np.exp(-0.7 * s / tau))
+        expectations = {"first_order": first, "two_poles": second, "moving_average": mean, "partly": part}
+        for form, expected in expectations.items():
             out = sense(active("sensor_lag", form, time_constant=tau), UNEVEN, s)
             assert_allclose(out, expected, atol=1e-12)
 
@@ -117,7 +120,7 @@ class TestSensorLag:
         assert np.abs(out - three)[1000:].max() < 1e-3 < 0.02 < np.abs(late - three)[1000:].max()
 
     def test_the_first_sample_is_rest(self) -> None:
-        for form in ("first_order", "two_poles", "butterworth", "moving_average", "decimator"):
+        for form in LAGS:
             assert_allclose(sense(active("sensor_lag", form), EVEN[:50], np.full(50, 4.0)), 4.0)
 
 
@@ -161,6 +164,32 @@ class TestResonance:
         part = sense(active("resonance", "partial", share=0.25, **numbers), EVEN, force)
         assert_allclose(part, 0.75 * force + 0.25 * whole, atol=1e-13)
 
+    def test_transmissibility_and_a_pole_after_the_mode(self) -> None:
+        """Gain and phase of sines, against the transfer functions."""
+        t = np.arange(40000) * 2e-4
+        w, z, r = 2 * math.pi * 20.0, 0.2, 3.0
+        late = t > 4
+        for ratio in (0.5, 1.0, 2.0):
+            s = 1j * ratio
+            mode = s * s + 2 * z * s + 1
+            transfers = {"transmitted": (2 * z * s + 1) / mode, "amplifier": 1 / mode / (1 + s / r)}
+            for form, transfer in transfers.items():
+                given = {"ratio": r} if form == "amplifier" else {}
+                effect_ = active("resonance", form, frequency=20.0, damping_ratio=z, **given)
+                out = sense(effect_, t, np.sin(ratio * w * t))
+                expected = np.imag(transfer * np.exp(1j * ratio * w * t))
+                assert_allclose(out[late], expected[late], atol=3e-4)
+
+    def test_other_shapes_are_exact_at_any_spacing(self) -> None:
+        """What comes out of ramps between uneven samples does not change when more samples lie on them."""
+        t = UNEVEN[:300]
+        force = np.cumsum(np.random.default_rng(5).standard_normal(t.size))
+        fine = np.sort(np.concatenate([t, (t[1:] + t[:-1]) / 2]))
+        for form in ("transmitted", "amplifier"):
+            ringing = active("resonance", form, frequency=20.0, damping_ratio=0.1)
+            whole = sense(ringing, fine, np.interp(fine, t, force))
+            assert_allclose(sense(ringing, t, force), whole[np.searchsorted(fine, t)], atol=1e-9)
+
 
 class TestBiasDriftHum:
     def test_bias(self) -> None:
@@ -172,6 +201,11 @@ class TestBiasDriftHum:
         assert_allclose(settles, -0.2 * (1 + 0.1 * np.exp([0.0, -1.0, -2.0, -20.0])))
         slips = sense(active("force_bias", "slipping", bias=-0.2, share=0.1, moved_at=5.0, within=0.1), t, np.zeros(4))
         assert_allclose(slips, [-0.19, -0.2, -0.21, -0.21])
+
+    def test_a_bias_that_pulls_along_the_way(self) -> None:
+        t, x = np.arange(6.0), np.array([-9.0, -1.0, 0.0, 1.0, 2.0, 9.0])
+        pulls = simulate(AIR, [active("force_bias", "along", bias=-0.2, share=0.1, reach=2.0)], t, x)
+        assert_allclose(pulls, -0.2 * np.array([0.9, 0.9, 0.95, 1.0, 1.05, 1.1]))
 
     @pytest.mark.parametrize("form", ["linear", "settling", "root", "logarithmic", "turning"])
     def test_all_drifts_begin_at_the_rate(self, form: str) -> None:
