@@ -250,6 +250,8 @@ class TestLimitsAndFaults:
     def test_saturation(self) -> None:
         assert_allclose(sample(active("saturation", limit=4.0), self.force), np.clip(self.force, -4, 4))
         assert_allclose(sample(active("saturation", "upper", limit=4.0), self.force), np.minimum(self.force, 4))
+        stopped = sample(active("saturation", "stop", limit=4.0, passes=0.05), self.force)
+        assert_allclose(stopped, np.minimum(self.force, 4) + 0.05 * np.maximum(self.force - 4, 0), atol=1e-12)
         soft = sample(active("saturation", "soft", limit=4.0, sharpness=3.0), self.force)
         assert np.all(np.diff(soft) > 0)
         assert np.abs(soft).max() < 4.0

@@ -8,8 +8,15 @@ from scipy.signal import lfilter
 
 from bench.diagnose import hum, swing
 from bench.diagnose.channel import faults
-from bench.diagnose.channel_causes import joined
+from bench.diagnose.channel_causes import beyond_limit, joined
+from bench.diagnose.data import Data
+from bench.diagnose.numbers import PadNumbers, Structure, cause_of
+from bench.diagnose.refit import Fit
 from bench.diagnose.result import CauseFound
+from sim.effects import effect
+from sim.elastic import Exponential
+from sim.pad import Pad
+from sim.relaxation import Relaxation
 from tests.truth.cases import draw_case
 
 SAMPLE_s = 0.002
@@ -137,6 +144,32 @@ def test_the_tail_of_heavy_noise_is_no_fault():
         force = force + 0.01 * rng.standard_t(5.0, len(force))
         flagged += bool(faults(force).outlier.any())
     assert flagged <= 1
+
+
+def test_what_is_left_below_a_ceiling_is_not_the_lower_half_of_its_noise():
+    """Holds close below a ceiling: which samples count must not go by their own noise."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        levels = np.repeat(np.linspace(5.4, 5.9, 11), 400)
+        noise = 0.02 * rng.standard_normal(len(levels) + 200)
+        force = np.minimum(np.concatenate([np.full(200, 8.0), levels]) + noise, 6.0)
+        found = faults(force)
+        assert found.saturated[:200].all() and not found.saturated[200:].any() and found.bent.any()
+        for k in range(200, len(force), 400):
+            left = noise[k : k + 400][found.good[k : k + 400]]
+            assert abs(left.mean() if len(left) else 0.0) < 4.0 * 0.02 / np.sqrt(max(len(left), 1))
+
+
+def test_samples_beyond_a_limit_that_was_fitted_are_told():
+    time, depth = np.arange(500) * 0.01, np.linspace(0.0, 2.0, 500)
+    pad = PadNumbers(Pad(Exponential(3.0, 0.0), Relaxation(), unilateral=True), 2.0, 6.0)
+    data = Data(time, depth, 3.0 * depth, np.ones(500), np.full(500, 0.01), np.zeros(500, dtype=np.intp))
+    for form in ("hard", "upper", "stop"):
+        limit = cause_of(effect("saturation"), effect("saturation").form(form), {"limit": 4.5})
+        structure = Structure(pad, (limit,))
+        fit = Fit(structure, structure.x(pad.x()), 0.0, np.eye(3), True)
+        assert np.array_equal(beyond_limit(data, fit), 3.0 * depth > 4.5)
+        assert not beyond_limit(data, Fit(Structure(pad), pad.x(), 0.0, np.eye(2), True)).any()
 
 
 @pytest.mark.parametrize(("frequency_Hz", "sample_s", "mains"), [
