@@ -23,6 +23,7 @@ from .evidence import Evidence, believable, evidence_of, least_gain, penalty, un
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, extended, force_at, jacobian, mean_square, reduced, refit
+from .shapes import departed
 
 Array = NDArray[np.float64]
 
@@ -416,8 +417,9 @@ class Search:
                 begun += [(without, s.cause) for s in starts(signatures, effect, form)]
                 trials = [self._joined(*start, MORE, None) for start in begun]
                 tried += [t for t in trials if t is not None]
-        tried = [self._carried(t, ALL) for t in sorted(tried, key=lambda t: t.score)[:2]]
-        return min([now, *(t.fit for t in tried)], key=lambda fit: fit.chi2)
+        fits = [self._carried(t, ALL).fit for t in sorted(tried, key=lambda t: t.score)[:2]]
+        others = [fit for fit in fits if not departed(fit, len(fit.structure.causes) - 1)]
+        return min([now, *others], key=lambda fit: fit.chi2)
 
     def settled(self, now: Fit, joined: Fit) -> Fit:
         """The fit before a cause was added, or a better one that the addition has led to: a valley may be long."""
