@@ -208,7 +208,10 @@ class Search:
         for id_ in [i for i in LATE if i in family and i != best.id]:
             # with the bounds of physics: a mode beyond what the sampling resolves is late, and no more
             own = effects.effect(id_)
-            late = [cause_of(own, own.forms[0], values) for values in as_late(id_, late_s)]
+            shapes = [own.forms[0]]
+            if id_ == "sensor_lag" and unexplained(best.fit.chi2, self.expected) > 0.0:  # the usual ones are not it
+                shapes += [form for form in own.forms if not form.sought]
+            late = [cause_of(own, shape, values) for shape in shapes for values in as_late(id_, late_s)]
             tried = [t for t in (self._joined(fit, cause, MORE, None) for cause in late) if t is not None]
             if tried:
                 again = self._carried(min(tried, key=lambda t: t.score), ALL)

@@ -8,6 +8,7 @@ first sample in all forms.
 - `root`: rate · 2τ (√(1 + t/τ) − 1), as heat that diffuses in.
 - `logarithmic`: rate · τ ln(1 + t/τ), as creep of glue and gauge.
 - `turning`: rate · (2τ/π) sin(πt/2τ), as a room that warms and cools: it turns at τ.
+- `quickening`: rate · t (1 + t/2τ), as a supply that ends: twice as quick at τ.
 
 Reference: OIML R 60, Metrological regulation for load cells (creep, and temperature effect on the dead load output).
 """
@@ -56,6 +57,13 @@ def turning(dt: float, force: float, state: State, p: State) -> float:
     return force + p[0] / slow * math.sin(slow * state[0])
 
 
+@block
+def quickening(dt: float, force: float, state: State, p: State) -> float:
+    """Quicker and quicker; p = (rate, time_constant)."""
+    state[0] += dt
+    return force + p[0] * state[0] * (1.0 + 0.5 * state[0] / p[1])
+
+
 _RATE = Parameter("rate", "N/s", -100.0, 100.0, 0.002, "rate at the first sample", required=True, amplitude=True)
 
 
@@ -98,6 +106,14 @@ EFFECT = Effect(
             parameters=(_RATE, _time_constant("time after which it turns")),
             sought=False,
             blocks={"sensor": turning},
+            state=(0.0,),
+        ),
+        Form(
+            name="quickening",
+            what="quicker and quicker, as a supply that ends",
+            parameters=(_RATE, _time_constant("time after which it is twice as quick")),
+            sought=False,
+            blocks={"sensor": quickening},
             state=(0.0,),
         ),
     ),

@@ -8,13 +8,16 @@ value. Each is exact for a force that is linear between samples, at any spacing.
   capacitor, (1 + (1 − σ)τs/σ)/(1 + τs/σ).
 - `two_poles`: critically damped, 1/(1 + τs/2)².
 - `butterworth`: second order without a peak, damping ratio 1/√2, ω = √2/τ.
+- `chebyshev`: four poles after Chebyshev with a ripple of 0.5 dB, as in front of converters: nearly a delay, and a
+  ringing after it.
 - `moving_average`: the mean over the last 2τ.
 - `decimator`: the mean over 2wτ around the time τ ago. With w = 1/√3 delay and width are those of three running means
   in a row, as of a converter's sinc³ decimator (E. B. Hogenauer, IEEE Trans. Acoust. Speech Signal Process. 29, 1981,
   155–162).
 
 Reference: E. O. Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3 (first
-and second order instruments and their response to a ramp).
+and second order instruments and their response to a ramp); A. I. Zverev, Handbook of Filter Synthesis, Wiley, 1967
+(poles after Chebyshev).
 """
 
 from __future__ import annotations
@@ -27,7 +30,7 @@ from sim.effects.linear import first_order as lagged
 from sim.effects.linear import low_pass
 from sim.jit import State, block
 
-_Y, _LAST, _STARTED, _Y2 = range(4)
+_Y, _LAST, _STARTED, _Y2, _V, _V2 = range(6)
 
 
 @block
@@ -89,6 +92,53 @@ def butterworth(dt: float, u: float, state: State, p: State) -> float:
         state[_Y2] = v
     state[_LAST] = u
     return state[_Y]
+
+
+def _modes(poles: list[complex]) -> list[tuple[float, float, float, float]]:
+    """Of poles, one of each pair, scaled to a delay of 1 in all: (ω, ζ, share of the mode's output, of its speed).
+
+    By partial fractions: Π −p over Π (s − p) is the sum over pairs of (b s + a)/(s² + 2ζω s + ω²).
+    """
+    every = [q for p in poles for q in (p, p.conjugate())]
+    delay = sum(-1.0 / p for p in every).real
+    every = [delay * p for p in every]
+    gain = math.prod((abs(delay * p) ** 2 for p in poles), start=1.0)
+    out = []
+    for p in (delay * p for p in poles):
+        rest = math.prod(((p - q) for q in every if q != p), start=complex(1.0))
+        residue, omega = gain / rest, abs(p)
+        a, b = -2.0 * (residue * p.conjugate()).real, 2.0 * residue.real
+        out.append((omega, -p.real / omega, a / omega**2, b / omega**2))
+    return out
+
+
+_RIPPLE, _ORDER = math.sqrt(10.0**0.05 - 1.0), 4
+_SINH, _COSH = math.sinh(math.asinh(1.0 / _RIPPLE) / _ORDER), math.cosh(math.asinh(1.0 / _RIPPLE) / _ORDER)
+_ANGLES = [math.pi * (2 * k + 1) / (2 * _ORDER) for k in range(_ORDER // 2)]
+(_W1, _Z1, _A1, _B1), (_W2, _Z2, _A2, _B2) = _modes(
+    [complex(-_SINH * math.sin(angle), _COSH * math.cos(angle)) for angle in _ANGLES]
+)
+
+
+@block
+def chebyshev(dt: float, u: float, state: State, p: State) -> float:
+    """Four poles after Chebyshev; p = (time_constant,)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_Y2] = u
+        state[_V] = 0.0
+        state[_V2] = 0.0
+        state[_LAST] = u
+        return u
+    y, v = low_pass(dt, state[_Y], state[_V], state[_LAST], u, _W1 / p[0], _Z1)
+    y2, v2 = low_pass(dt, state[_Y2], state[_V2], state[_LAST], u, _W2 / p[0], _Z2)
+    state[_Y] = y
+    state[_V] = v
+    state[_Y2] = y2
+    state[_V2] = v2
+    state[_LAST] = u
+    return _A1 * y + _A2 * y2 + p[0] * (_B1 * v + _B2 * v2)
 
 
 # moving average: the integral of the force at knots in a ring; (age of the newest, integral, force, time) …
@@ -209,6 +259,14 @@ EFFECT = Effect(
             parameters=(_TIME_CONSTANT,),
             blocks={"sensor": butterworth},
             state=(0.0,) * 4,
+        ),
+        Form(
+            name="chebyshev",
+            what="four poles, nearly a delay",
+            parameters=(_TIME_CONSTANT,),
+            sought=False,
+            blocks={"sensor": chebyshev},
+            state=(0.0,) * 6,
         ),
         Form(
             name="moving_average",

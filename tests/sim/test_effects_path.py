@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from scipy.signal import cheb1ap
 
 from sim.effects import Active, effect
 from sim.effects.draws import uniform
@@ -85,6 +86,17 @@ class TestSensorLag:
         for form, expected in expectations.items():
             out = sense(active("sensor_lag", form, time_constant=tau), UNEVEN, s)
             assert_allclose(out, expected, atol=1e-12)
+
+    def test_chebyshev_ripples_by_half_a_decibel_and_then_falls(self) -> None:
+        """|H|² = 1/(1 + ε² T₄²(ω/ω_c)): 1 at the crests of the ripple; delay and band edge go with each other."""
+        t, tau = np.arange(60000) * 1e-4, 0.01
+        poles = cheb1ap(4, 0.5)[1]
+        edge = float(np.sum(-1 / poles).real) / tau
+        for ratio in (0.3, math.cos(math.pi / 4), 1.0, 1.5):
+            out = sense(active("sensor_lag", "chebyshev", time_constant=tau), t, np.sin(ratio * edge * t))
+            chebyshev = 8 * ratio**4 - 8 * ratio**2 + 1
+            level = math.sqrt(1 + (10**0.05 - 1)) / math.sqrt(1 + (10**0.05 - 1) * chebyshev**2)
+            assert_allclose(np.abs(out[t > 3]).max(), level, rtol=1e-3)
 
     def test_butterworth_overshoots_a_step_by_four_percent(self) -> None:
         force = np.where(EVEN > 0.1, 1.0, 0.0)
@@ -172,20 +184,37 @@ class TestResonance:
         for ratio in (0.5, 1.0, 2.0):
             s = 1j * ratio
             mode = s * s + 2 * z * s + 1
-            transfers = {"transmitted": (2 * z * s + 1) / mode, "amplifier": 1 / mode / (1 + s / r)}
+            other, zeros = s * s + 2 * z * s * r + r * r, (s / r) ** 2 + 2 * z * s / r + 1
+            transfers = {
+                "transmitted": (2 * z * s + 1) / mode,
+                "amplifier": 1 / mode / (1 + s / r),
+                "pair": 0.7 / mode + 0.3 * r * r / other,
+                "antiresonance": zeros / mode,
+            }
             for form, transfer in transfers.items():
-                given = {"ratio": r} if form == "amplifier" else {}
+                given = {} if form == "transmitted" else {"ratio": r}
+                given |= {"share": 0.7} if form == "pair" else {}
                 effect_ = active("resonance", form, frequency=20.0, damping_ratio=z, **given)
                 out = sense(effect_, t, np.sin(ratio * w * t))
                 expected = np.imag(transfer * np.exp(1j * ratio * w * t))
                 assert_allclose(out[late], expected[late], atol=3e-4)
+
+    def test_a_mode_that_is_stiffer_under_load(self) -> None:
+        """Small steps beside a load that stays: they ring at √(1 + growth (F/at − 1)) of the frequency."""
+        t = np.arange(20000) * 1e-4
+        for load in (0.0, 4.0, 8.0):
+            numbers = {"frequency": 20.0, "damping_ratio": 0.05, "growth": 0.36, "at_force": 4.0}
+            rings = sense(active("resonance", "loaded", **numbers), t, np.where(t > 0.1, load + 1e-3, load)) - load
+            faster = math.sqrt(1 + 0.36 * (load / 4.0 - 1))
+            plain = active("resonance", frequency=20.0 * faster, damping_ratio=0.05 / faster)
+            assert_allclose(rings, sense(plain, t, np.where(t > 0.1, 1e-3, 0.0)), atol=1e-6)
 
     def test_other_shapes_are_exact_at_any_spacing(self) -> None:
         """What comes out of ramps between uneven samples does not change when more samples lie on them."""
         t = UNEVEN[:300]
         force = np.cumsum(np.random.default_rng(5).standard_normal(t.size))
         fine = np.sort(np.concatenate([t, (t[1:] + t[:-1]) / 2]))
-        for form in ("transmitted", "amplifier"):
+        for form in ("transmitted", "amplifier", "pair", "antiresonance"):
             ringing = active("resonance", form, frequency=20.0, damping_ratio=0.1)
             whole = sense(ringing, fine, np.interp(fine, t, force))
             assert_allclose(sense(ringing, t, force), whole[np.searchsorted(fine, t)], atol=1e-9)
@@ -207,7 +236,7 @@ class TestBiasDriftHum:
         pulls = simulate(AIR, [active("force_bias", "along", bias=-0.2, share=0.1, reach=2.0)], t, x)
         assert_allclose(pulls, -0.2 * np.array([0.9, 0.9, 0.95, 1.0, 1.05, 1.1]))
 
-    @pytest.mark.parametrize("form", ["linear", "settling", "root", "logarithmic", "turning"])
+    @pytest.mark.parametrize("form", [form.name for form in effect("force_drift").forms])
     def test_all_drifts_begin_at_the_rate(self, form: str) -> None:
         t = np.array([5.0, 5.001])
         assert_allclose(sense(active("force_drift", form, rate=-0.3), t, np.zeros(2)), [0.0, -0.3e-3], rtol=1e-4)
@@ -220,6 +249,8 @@ class TestBiasDriftHum:
         assert_allclose(sense(active("force_drift", "settling", **numbers), t, zero)[1:], 0.2)
         turns = sense(active("force_drift", "turning", **numbers), np.array([0.0, 20.0, 40.0]), zero)
         assert_allclose(turns, [0.0, 0.4 / math.pi, 0.0], atol=1e-12)
+        ends = sense(active("force_drift", "quickening", **numbers), np.array([0.0, 20.0, 40.0]), zero)
+        assert_allclose(ends, [0.0, 0.3, 0.8], atol=1e-12)
         root = sense(active("force_drift", "root", **numbers), t, zero)
         assert_allclose(root[2] / root[1], 2.0, rtol=0.05)
         log = sense(active("force_drift", "logarithmic", **numbers), t, zero)
