@@ -18,8 +18,8 @@ Exact for a force that is linear between samples, at any spacing, but for the la
 
 Reference: W. T. Thomson, Theory of Vibration with Applications, 4th ed., Prentice Hall, 1993; E. O. Doebelin,
 Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3; J. P. Den Hartog, Mechanical
-Vibrations, 4th ed., McGraw-Hill, 1956, section 2.12 (transmissibility); D. J. Ewins, Modal Testing, 2nd ed., Research Studies Press,
-2000, chapter 2 (modes side by side, antiresonances).
+Vibrations, 4th ed., McGraw-Hill, 1956, section 2.12 (transmissibility); D. J. Ewins, Modal Testing, 2nd ed., Research
+Studies Press, 2000, chapter 2 (modes side by side, antiresonances).
 """
 
 from __future__ import annotations
