@@ -174,7 +174,8 @@ class Search:
         return self._plainer(fit, sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score))
 
     def _plainer(self, fit: Fit, ranked: list[Trial]) -> list[Trial]:
-        """First the one of fewest numbers, where what it leaves more is little beside what the best leaves too."""
+        """First the one of fewest numbers, and of as many the first form of its family, where what it leaves more is
+        little beside what the best leaves too."""
         if not ranked:
             return ranked
         best = ranked[0].fit
@@ -182,9 +183,12 @@ class Search:
 
         def as_good(t: Trial) -> bool:
             more = t.fit.chi2 - best.chi2
-            return t.fit.free < best.free and more < ALIKE * gained and more < ALIKE_LEFT * beyond
+            return plainness(t) < plainness(ranked[0]) and more < ALIKE * gained and more < ALIKE_LEFT * beyond
 
-        plain = min((t for t in ranked[1:] if as_good(t)), key=lambda t: t.fit.free, default=None)
+        def plainness(t: Trial) -> tuple[int, bool]:
+            return t.fit.free, not _usual(t)
+
+        plain = min((t for t in ranked[1:] if as_good(t)), key=plainness, default=None)
         return ranked if plain is None else [plain, *(t for t in ranked if t is not plain)]
 
     def _relaxing_as(self, best: Trial, trial: Trial) -> list[Trial]:

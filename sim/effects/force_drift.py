@@ -8,6 +8,7 @@ first sample in all forms.
 - `root`: rate · 2τ (√(1 + t/τ) − 1), as heat that diffuses in.
 - `logarithmic`: rate · τ ln(1 + t/τ), as creep of glue and gauge.
 - `turning`: rate · (2τ/π) sin(πt/2τ), as a room that warms and cools: it turns at τ.
+- `bent`: rate · t until a time, and a share of that rate from there on, as where a door is opened or a heater goes off.
 - `quickening`: rate · t (1 + t/2τ), as a supply that ends: twice as quick at τ.
 
 Reference: OIML R 60, Metrological regulation for load cells (creep, and temperature effect on the dead load output).
@@ -64,6 +65,13 @@ def quickening(dt: float, force: float, state: State, p: State) -> float:
     return force + p[0] * state[0] * (1.0 + 0.5 * state[0] / p[1])
 
 
+@block
+def bent(dt: float, force: float, state: State, p: State) -> float:
+    """Steady, and steady otherwise from a time on; p = (rate, share, moved_at)."""
+    state[0] += dt
+    return force + p[0] * (min(state[0], p[2]) + p[1] * max(state[0] - p[2], 0.0))
+
+
 _RATE = Parameter("rate", "N/s", -100.0, 100.0, 0.002, "rate at the first sample", required=True, amplitude=True)
 
 
@@ -114,6 +122,18 @@ EFFECT = Effect(
             parameters=(_RATE, _time_constant("time after which it is twice as quick")),
             sought=False,
             blocks={"sensor": quickening},
+            state=(0.0,),
+        ),
+        Form(
+            name="bent",
+            what="steady, and at another rate from a time on",
+            parameters=(
+                _RATE,
+                Parameter("share", "1", -3.0, 3.0, 0.3, "rate after it over the rate before"),
+                Parameter("moved_at", "s", 0.0, 1e6, 30.0, "time at which it changes, from the first sample on"),
+            ),
+            sought=False,
+            blocks={"sensor": bent},
             state=(0.0,),
         ),
     ),
