@@ -99,6 +99,15 @@ def hum_cause(line: Line) -> Cause:
     if line.growth_1_N != 0.0:
         own = {"growth": line.growth_1_N, "at_force": line.at_N}
         return cause_of(hum, hum.form("loaded_harmonics" if third else "loaded"), values | third | own)
+    if line.swing:
+        names = ("period", "swell", "swell_phase", "wander", "wander_phase")
+        return cause_of(hum, hum.form("swinging"), values | dict(zip(names, line.swing, strict=True)))
+    if line.higher:
+        words = {5: "fifth", 7: "seventh"}
+        none = {"fifth": 0.0, "seventh": 0.0, "ratio": 0.0}
+        own = {words[order]: ratio for order, ratio, _ in line.higher}
+        own |= {f"{words[order]}_phase": angle for order, _, angle in line.higher}
+        return cause_of(hum, hum.form("flat_topped"), values | none | third | own)
     if third:
         return cause_of(hum, hum.form("harmonics"), values | third)
     return cause_of(hum, hum.form("sine"), values)

@@ -10,7 +10,7 @@ the stamps tell, as they are never quite even, or else the one that is nearest t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ GRIDS_HZ = (50.0, 60.0)
 LEVEL = 1e-5  # of a line by chance, over all frequencies
 LEAST_SHARE = 0.002  # of the noise power
 TOLD = 15.0  # times the noise power per sample: what a further number of the line must take
+HARMONICS = (3, 5, 7)
+WINDOW_S, FEWEST = 1.0, 20  # in which a line stands still while it swings slowly, and samples that tell of it there
 MOST_GROWTH = 2.0  # of the amplitude, from the least load of the holds to the greatest
 
 
@@ -33,7 +35,8 @@ MOST_GROWTH = 2.0  # of the amplitude, from the least load of the holds to the g
 class Line:
     """Σ over harmonics (1, 3) of the sines found; `frequency_Hz`, `amplitude_N` and `phase_rad` of the first at t = 0,
     `ratio` and `third_phase_rad` of the third (0 where there is none). All grows by `growth_1_N`, of itself, with each
-    newton that the cell bears beyond `at_N`, where the amplitude is as stated."""
+    newton that the cell bears beyond `at_N`, where the amplitude is as stated. `higher`: (order, ratio, phase) of
+    further harmonics. `swing`: (period in s, swell, its phase, wander in rad, its phase), as in the effect's form."""
 
     frequency_Hz: float
     amplitude_N: float
@@ -43,6 +46,8 @@ class Line:
     sample_s: float = 1e-3
     growth_1_N: float = 0.0
     at_N: float = 0.0
+    higher: tuple[tuple[int, float, float], ...] = ()
+    swing: tuple[float, ...] = ()
 
     @property
     def of_the_mains(self) -> bool:
@@ -54,9 +59,18 @@ class Line:
     def force_N(self, time_s: Array, load_N: Array) -> Array:
         """The line at times (n,) since its start, under loads (n,)."""
         angle = 2.0 * np.pi * self.frequency_Hz * time_s
-        third = self.ratio * np.sin(3.0 * angle + self.third_phase_rad)
         swells = self.amplitude_N * (1.0 + self.growth_1_N * (load_N - self.at_N))
-        return np.asarray(swells * (np.sin(angle + self.phase_rad) + third))
+        first = angle + self.phase_rad
+        if self.swing:
+            period, swell, swell_phase, wander, wander_phase = self.swing
+            slow = 2.0 * np.pi * time_s / period
+            swells, first = (
+                swells * (1.0 + swell * np.sin(slow + swell_phase)),
+                first + wander * np.sin(slow + wander_phase),
+            )
+        others = [(3, self.ratio, self.third_phase_rad), *self.higher]
+        wave = np.sin(first) + sum(ratio * np.sin(order * angle + phase) for order, ratio, phase in others if ratio)
+        return np.asarray(swells * wave)
 
 
 def _grid_Hz() -> Array:
@@ -102,17 +116,72 @@ def find(start_s: float, parts: list[Part], stamp_s: Array, force_N: Array) -> L
         return None
     amplitude, phase = float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
     load = force_N[np.searchsorted(stamp_s, stamps)] - e
+    line = Line(f, amplitude, phase, 0.0, 0.0, step)
+    shapes = [_with_harmonics(line, t, e, least, highest, spacing)]
     growth = _growth(t, e, f, load, least)
-    at = float(np.mean(force_N)) if growth else 0.0  # what is stated is the mean over the run
-    there = 1.0 + growth * (at - float(np.mean(load)))
-    amplitude, growth = amplitude * there, growth / there
-    ratio = third = 0.0
-    seen = _folded(np.array([f, 3.0 * f]), 1.0 / step)
-    if LOWEST_HZ < seen[1] < highest and abs(seen[1] - seen[0]) > 16.0 * spacing:
-        more, s3, c3 = _taken(t, e, 3.0 * f)
-        if more > least:
-            ratio, third = float(np.hypot(s3, c3)) / amplitude, float(np.arctan2(c3, s3))
-    return Line(f, amplitude, phase, ratio, third, step, growth, at)
+    if growth:
+        at = float(np.mean(force_N))  # what is stated is the mean over the run
+        there = 1.0 + growth * (at - float(np.mean(load)))
+        shapes.append(replace(shapes[0], amplitude_N=amplitude * there, growth_1_N=growth / there, at_N=at, higher=()))
+    swinging = _swinging(line, parts, start_s)
+    shapes += [swinging] if swinging is not None else []
+    # the plainest, unless another one takes more than its numbers do by chance
+    return min(shapes, key=lambda one: float(np.sum((e - one.force_N(t, load)) ** 2)) + least * _numbers(one))
+
+
+def _numbers(line: Line) -> int:
+    return 2 * (line.ratio > 0.0) + 2 * len(line.higher) + (line.growth_1_N != 0.0) + len(line.swing)
+
+
+def _with_harmonics(line: Line, t: Array, e: Array, least: float, highest: float, spacing: float) -> Line:
+    """The line with those of its odd harmonics that are more than chance, and do not look like each other."""
+    f, rate = line.frequency_Hz, 1.0 / line.sample_s
+    seen, found = [float(_folded(f, rate))], []
+    for order in HARMONICS:
+        here = float(_folded(order * f, rate))
+        if LOWEST_HZ < here < highest and min(abs(here - other) for other in seen) > 16.0 * spacing:
+            more, sine, cosine = _taken(t, e, order * f)
+            if more > least:
+                seen.append(here)
+                found.append((order, float(np.hypot(sine, cosine)) / line.amplitude_N, float(np.arctan2(cosine, sine))))
+    third = next(((ratio, phase) for order, ratio, phase in found if order == 3), (0.0, 0.0))
+    return replace(line, ratio=third[0], third_phase_rad=third[1], higher=tuple(one for one in found if one[0] != 3))
+
+
+def _swinging(line: Line, parts: list[Part], start_s: float) -> Line | None:
+    """The line with amplitude and phase that swing slowly, as windows of the holds have them; None: too few windows."""
+    at, z = [], []
+    for stamps, e, _ in parts:
+        count = max(int((stamps[-1] - stamps[0]) / WINDOW_S), 1)
+        for own in np.array_split(np.arange(len(stamps)), count):
+            if len(own) >= FEWEST:
+                t = stamps[own] - start_s
+                _, sine, cosine = _taken(t, e[own], line.frequency_Hz)
+                at.append(float(t.mean()))
+                z.append(complex(sine, cosine))
+    if len(z) < 12:
+        return None
+    when, way = np.array(at), np.array(z)
+    angle, size = np.unwrap(np.angle(way)), np.abs(way)
+    span, best = float(when[-1] - when[0]), (np.inf, 0.0, np.zeros(7))
+    for cycles in np.arange(0.5, min(span / (4.0 * WINDOW_S), 40.0), 0.25):
+        slow = 2.0 * np.pi * cycles / span * when
+        A = np.stack([np.ones(len(when)), np.sin(slow), np.cos(slow), when / span], axis=1)
+        of_angle, of_size = (np.linalg.lstsq(B, y, rcond=None)[0] for B, y in ((A, angle), (A[:, :3], size)))
+        left = np.sum((size - A[:, :3] @ of_size) ** 2) + np.sum((size.mean() * (angle - A @ of_angle)) ** 2)
+        if left < best[0]:
+            best = (float(left), span / cycles, np.concatenate([of_angle, of_size]))
+    _, period, x = best
+    if not x[4] > 0.0:
+        return None
+    swell, wander = float(np.hypot(x[5], x[6])) / float(x[4]), float(np.hypot(x[1], x[2]))
+    return replace(
+        line,
+        frequency_Hz=line.frequency_Hz + float(x[3]) / span / (2.0 * np.pi),
+        amplitude_N=float(x[4]),
+        phase_rad=float(np.angle(np.exp(1j * x[0]))),
+        swing=(period, min(swell, 1.0), float(np.arctan2(x[6], x[5])), wander, float(np.arctan2(x[2], x[1]))),
+    )
 
 
 def _spectrum(t: Array, e: Array, step: float) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ value. Each is exact for a force that is linear between samples, at any spacing.
   capacitor, (1 + (1 − σ)τs/σ)/(1 + τs/σ).
 - `two_poles`: critically damped, 1/(1 + τs/2)².
 - `butterworth`: second order without a peak, damping ratio 1/√2, ω = √2/τ.
+- `three_poles`: after Butterworth, 1/((1 + s/ω)(1 + s/ω + s²/ω²)) with ω = 2/τ, which overshoots by 8 %.
 - `chebyshev`: four poles after Chebyshev with a ripple of 0.5 dB, as in front of converters: nearly a delay, and a
   ringing after it.
 - `moving_average`: the mean over the last 2τ.
@@ -92,6 +93,26 @@ def butterworth(dt: float, u: float, state: State, p: State) -> float:
         state[_Y2] = v
     state[_LAST] = u
     return state[_Y]
+
+
+@block
+def three_poles(dt: float, u: float, state: State, p: State) -> float:
+    """Third order after Butterworth, by partial fractions: 1/(1 + s) − s/(1 + s + s²); p = (time_constant,)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_Y2] = u
+        state[_V2] = 0.0
+        state[_LAST] = u
+        return u
+    omega = 2.0 / p[0]
+    y = lagged(dt, state[_Y], state[_LAST], u, 1.0 / omega)
+    y2, v2 = low_pass(dt, state[_Y2], state[_V2], state[_LAST], u, omega, 0.5)
+    state[_Y] = y
+    state[_Y2] = y2
+    state[_V2] = v2
+    state[_LAST] = u
+    return y - v2 / omega
 
 
 def _modes(poles: list[complex]) -> list[tuple[float, float, float, float]]:
@@ -259,6 +280,14 @@ EFFECT = Effect(
             parameters=(_TIME_CONSTANT,),
             blocks={"sensor": butterworth},
             state=(0.0,) * 4,
+        ),
+        Form(
+            name="three_poles",
+            what="third order, as flat as can be",
+            parameters=(_TIME_CONSTANT,),
+            sought=False,
+            blocks={"sensor": three_poles},
+            state=(0.0,) * 6,
         ),
         Form(
             name="chebyshev",

@@ -98,6 +98,12 @@ class TestSensorLag:
             level = math.sqrt(1 + (10**0.05 - 1)) / math.sqrt(1 + (10**0.05 - 1) * chebyshev**2)
             assert_allclose(np.abs(out[t > 3]).max(), level, rtol=1e-3)
 
+    def test_three_poles_pass_sines_as_butterworths_do(self) -> None:
+        t, tau = np.arange(60000) * 1e-4, 0.01
+        for ratio in (0.3, 1.0, 1.5):
+            out = sense(active("sensor_lag", "three_poles", time_constant=tau), t, np.sin(ratio * 2 / tau * t))
+            assert_allclose(np.abs(out[t > 3]).max(), 1 / math.sqrt(1 + ratio**6), rtol=1e-3)
+
     def test_butterworth_overshoots_a_step_by_four_percent(self) -> None:
         force = np.where(EVEN > 0.1, 1.0, 0.0)
         out = sense(active("sensor_lag", "butterworth", time_constant=0.05), EVEN, force)
@@ -266,6 +272,18 @@ class TestBiasDriftHum:
         both = sense(active("mains_hum", "harmonics", amplitude=0.1, ratio=0.3), t, np.zeros(t.size))
         spectrum = np.abs(np.fft.rfft(both)) / 2000
         assert_allclose(spectrum[[200, 400, 600]], [0.1, 0.0, 0.03], atol=1e-9)
+
+    def test_hum_with_more_harmonics_and_hum_that_swings(self) -> None:
+        t = np.arange(4000) * 1e-3
+        given = {"ratio": 0.3, "fifth": 0.2, "fifth_phase": 1.0, "seventh": 0.1}
+        flat = sense(active("mains_hum", "flat_topped", amplitude=0.1, **given), t, np.zeros(t.size))
+        spectrum = np.abs(np.fft.rfft(flat)) / 2000
+        assert_allclose(spectrum[[200, 600, 1000, 1400]], [0.1, 0.03, 0.02, 0.01], atol=1e-9)
+        swing = {"period": 4.0, "swell": 0.4, "swell_phase": 0.3, "wander": 0.5, "wander_phase": 1.0}
+        out = sense(active("mains_hum", "swinging", amplitude=0.1, frequency=50.0, **swing), t, np.zeros(t.size))
+        slow = 2 * math.pi * t / 4.0
+        angle = 2 * math.pi * 50 * t + 0.5 * np.sin(slow + 1.0)
+        assert_allclose(out, 0.1 * (1 + 0.4 * np.sin(slow + 0.3)) * np.sin(angle), atol=1e-9)
 
     def test_hum_that_grows_with_the_load(self) -> None:
         t = np.arange(4000) * 1e-3

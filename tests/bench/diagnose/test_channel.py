@@ -218,6 +218,25 @@ def test_a_line_that_grows_with_the_load_is_stated_at_the_mean_force():
         assert np.std(e - line.force_N(t, load)) == pytest.approx(0.01, rel=0.03)
 
 
+@pytest.mark.parametrize("shape", ["sine", "odd harmonics", "swells", "wanders"])
+def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        t = np.arange(36_500) / 730.0
+        slow = np.sin(2 * np.pi * t / 23.0 + 0.4)
+        swells = 1.0 + (0.3 * slow if shape == "swells" else 0.0)
+        angle = 2 * np.pi * 50.0 * t + (0.4 * slow if shape == "wanders" else 0.0)
+        tops = np.sin(3 * angle) / 5 - np.sin(5 * angle + 0.2) / 10 if shape == "odd harmonics" else 0.0
+        clean = 0.03 * (swells * np.sin(angle + 0.5) + tops)
+        e = clean + 0.01 * rng.standard_normal(len(t))
+        line = hum.find(0.0, _holds(t, e, 4500), t, e)
+        assert line is not None
+        assert bool(line.swing) == (shape in ("swells", "wanders"))
+        assert [order for order, _, _ in line.higher] == ([5] if shape == "odd harmonics" else [])
+        assert line.growth_1_N == 0.0
+        assert np.std(line.force_N(t, np.zeros(len(t))) - clean) < 1.5e-3
+
+
 def test_what_sways_at_a_frequency_of_its_own_is_seen_and_noise_is_not():
     for seed in SEEDS:
         rng = np.random.default_rng(seed)
