@@ -170,7 +170,7 @@ def _swinging(line: Line, parts: list[Part], start_s: float) -> Line | None:
         of_angle, of_size = (np.linalg.lstsq(B, y, rcond=None)[0] for B, y in ((A, angle), (A[:, :3], size)))
         left = np.sum((size - A[:, :3] @ of_size) ** 2) + np.sum((size.mean() * (angle - A @ of_angle)) ** 2)
         if left < best[0]:
-            best = (float(left), span / cycles, np.concatenate([of_angle, of_size]))
+            best = (float(left), float(span / cycles), np.concatenate([of_angle, of_size]))
     _, period, x = best
     if not x[4] > 0.0:
         return None

@@ -7,6 +7,7 @@ first sample in all forms.
 - `settling`: rate · τ (1 − e^(−t/τ)), one thermal time constant.
 - `root`: rate · 2τ (√(1 + t/τ) − 1), as heat that diffuses in.
 - `logarithmic`: rate · τ ln(1 + t/τ), as creep of glue and gauge.
+- `hyperbolic`: rate · t/(1 + t/τ), as recovery by many processes of which each is slower than the last.
 - `turning`: rate · (2τ/π) sin(πt/2τ), as a room that warms and cools: it turns at τ.
 - `bent`: rate · t until a time, and a share of that rate from there on, as where a door is opened or a heater goes off.
 - `quickening`: rate · t (1 + t/2τ), as a supply that ends: twice as quick at τ.
@@ -48,6 +49,13 @@ def logarithmic(dt: float, force: float, state: State, p: State) -> float:
     """Logarithm of time in the end; p = (rate, time_constant)."""
     state[0] += dt
     return force + p[0] * p[1] * math.log1p(state[0] / p[1])
+
+
+@block
+def hyperbolic(dt: float, force: float, state: State, p: State) -> float:
+    """To a limit, slowly; p = (rate, time_constant)."""
+    state[0] += dt
+    return force + p[0] * state[0] / (1.0 + state[0] / p[1])
 
 
 @block
@@ -106,6 +114,14 @@ EFFECT = Effect(
             what="with the logarithm of time in the end",
             parameters=(_RATE, _time_constant("time from which the rate falls")),
             blocks={"sensor": logarithmic},
+            state=(0.0,),
+        ),
+        Form(
+            name="hyperbolic",
+            what="to a limit that it is long in reaching",
+            parameters=(_RATE, _time_constant("time in which it is half way")),
+            sought=False,
+            blocks={"sensor": hyperbolic},
             state=(0.0,),
         ),
         Form(
