@@ -80,9 +80,7 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     elif p.name == "period":
         # some levels of depth are met by any ripple that is short enough
         lower, upper = max(lower, SHORTEST * longest_mm), min(upper, longest_mm)
-    elif (
-        p.name == "range" and p.unit == "mm"
-    ):  # a pull beyond the widest gap is a bias; a pad may lag by half its depth
+    elif p.name == "range":  # a pull beyond the widest gap is a bias; a pad may lag by half its depth
         upper = min(upper, reach.travel_mm - 0.5 * reach.depth_mm)
     elif p.name == "reach":
         default = reach.depth_mm

@@ -38,7 +38,7 @@ NARROWED, SLOW, JUMPS = 2.0, 4.0, 4.0  # usual second differences: below a ceili
 BENT = 15.0  # logarithm of the likelihood that a width must gain over none to be known, or lose to be excluded
 SLOWED = (2, 3, 4)  # samples that a channel says one value for, when it is for a while that much slower
 BESIDE = 5  # neighbours on either side that a stray sample is held against: bursts are shorter
-ASIDE, CALM = 8, 0.6  # neighbours on either side of a residual, and the share of them that a burst leaves alone
+ASIDE, CALM = 8, 0.6  # neighbours on either side of a force or a residual, and their share that a burst leaves alone
 FAR = 6.0  # noise deviations that an outlier stands off at the least
 FEW, ALONE = 3, 1.7  # outliers that are a fault; and times further off is one that is no fault, but no noise either
 BULK = 9.0  # medians of the size: within some six deviations of white noise
@@ -202,7 +202,8 @@ def _knee(force: Array, saturated: Mask, limit: float) -> tuple[Mask, Mask]:
 
     The noise tells: it comes through with the slope of the knee. That is taken for 1 − u², u from 0 at the knee's begin
     to 1 at the ceiling, as of a hyperbolic tangent. How wide the knee is has a likelihood, by exponential sizes of the
-    second differences. Close below the ceiling a sharp one, too, narrows the noise.
+    second differences. Close below the ceiling a sharp one, too, narrows the noise. What a sample's neighbours are says
+    whether it is within: by its own force those left would be the lower ones of a hold.
     """
     y, top = force * np.sign(limit), abs(limit)
     bend = np.abs(np.diff(force, 2))
@@ -217,10 +218,21 @@ def _knee(force: Array, saturated: Mask, limit: float) -> tuple[Mask, Mask]:
     costs = np.array([float(np.sum(size / s + np.log(s) - size)) for s in slope])
     if costs.min() < -BENT:
         width = float(widths[np.argmin(costs)])
-        u = 1.0 - (top - y) / (width * top)
-        return u > 0.0, u > AT_LAST
+        ended = 1.0 - (top - y) / (width * top) > AT_LAST
+        return (_beside(y) > top * (1.0 - width)) | ended, ended
     unsure = widths[(costs < BENT) & (widths <= USUAL_KNEE)]
-    return y > top * (1.0 - float(unsure.max(initial=0.0))), np.zeros(len(force), dtype=bool)
+    return _beside(y) > top * (1.0 - float(unsure.max(initial=0.0))), np.zeros(len(force), dtype=bool)
+
+
+def _beside(force: Array) -> Array:
+    """Median of each sample's neighbours, without itself (m,)."""
+    return np.asarray(np.median(_neighbours(force, ASIDE), axis=0))
+
+
+def _neighbours(values: Array, reach: int) -> Array:
+    """Of each value (m,) the others up to so many away on either side (2 reach, m), the ends repeated."""
+    padded = np.pad(values, reach, mode="edge")
+    return np.stack([padded[k : k + len(values)] for k in range(2 * reach + 1) if k != reach])
 
 
 def _slowed(force: Array, but: Mask) -> Mask:
@@ -323,8 +335,7 @@ def _spikes(force: Array, good: Mask) -> Mask:
         return mask
     noise = 1.4826 * float(np.median(np.abs(np.diff(y, 2) - np.median(np.diff(y, 2))))) / np.sqrt(6.0)
     noise = max(noise, resolution(force) / np.sqrt(12.0), 1e-12)
-    padded = np.pad(y, BESIDE, mode="edge")
-    around = np.stack([padded[k : k + len(y)] for k in range(2 * BESIDE + 1) if k != BESIDE])
+    around = _neighbours(y, BESIDE)
     middle = np.median(around, axis=0)
     spread = np.sort(around, axis=0)
     reach = spread[-3] - spread[2]  # in a move the neighbours themselves lie apart
@@ -409,8 +420,7 @@ def standing_off(residual: Array, good: Mask, suspect: Mask) -> Mask:
     if len(index) < 30:
         return mask
     e = residual[index]
-    padded = np.pad(e, ASIDE, mode="edge")
-    around = np.stack([padded[k : k + len(e)] for k in range(2 * ASIDE + 1) if k != ASIDE])
+    around = _neighbours(e, ASIDE)
     middle = np.median(around, axis=0)
     calm = np.quantile(np.abs(around - middle), CALM, axis=0)
     limit = far(e - middle)

@@ -11,14 +11,15 @@ from bench.recording.types import Measurement
 from sim.effects import effect
 
 from .channel import Faults
-from .data import Prepared
+from .data import Data, Prepared
 from .hum import Line
 from .numbers import Cause, cause_of
-from .refit import Fit
+from .refit import Fit, force_at, reduced
 from .result import CauseFound, Number
 from .verdict import described
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 SEEN = 0.001  # of the samples that repeat: told, whatever they add to the error
 FEWEST = 3  # stray samples that are called a fault
@@ -32,7 +33,7 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
     n = max(len(at), 1)
     out = []
     if prepared.hum is not None and prepared.hum.of_the_mains:
-        hum = prepared.hum.force_N((prepared.full.time_s - prepared.full.time_s[0])[at][counted])
+        hum = prepared.hum_N[at][counted]
         id_, form, numbers = described(final, len(final.structure.causes) - 1)
         out.append(_named(id_, form, numbers, float(np.sum(hum**2)) / n))
     masks = {"saturation": flags.saturated, "stuck_samples": flags.stuck, "outliers": flags.outlier}
@@ -78,11 +79,35 @@ def _named(id_: str, form: str, numbers: Mapping[str, Number], square: float) ->
     return CauseFound(id_, form, dict(numbers), square, 0.99, [], words, cause.check)
 
 
+def beyond_limit(data: Data, fit: Fit) -> Mask:
+    """Where on the grid (n,) the force of a fit is more than its channel reports: what is there tells of the limit, and
+    not of the pad."""
+    index = next((k for k, c in enumerate(fit.structure.causes) if c.id == "saturation"), None)
+    if index is None:
+        return np.zeros(data.size, dtype=bool)
+    limit_N = fit.structure.values(fit.x)[index]["limit"]
+    force = force_at(data, *reduced(fit, index))
+    one_sided = fit.structure.causes[index].form.name in ("upper", "stop")
+    return np.asarray((force if one_sided else np.abs(force)) > limit_N)
+
+
 def hum_cause(line: Line) -> Cause:
     """The effect that makes the line."""
     hum = effect("mains_hum")
     values = {"amplitude": line.amplitude_N, "frequency": line.frequency_Hz, "phase": line.phase_rad}
-    if line.ratio > 0.0:
-        third = {"ratio": line.ratio, "third_phase": line.third_phase_rad}
+    third = {"ratio": line.ratio, "third_phase": line.third_phase_rad} if line.ratio > 0.0 else {}
+    if line.growth_1_N != 0.0:
+        own = {"growth": line.growth_1_N, "at_force": line.at_N}
+        return cause_of(hum, hum.form("loaded_harmonics" if third else "loaded"), values | third | own)
+    if line.swing:
+        names = ("period", "swell", "swell_phase", "wander", "wander_phase")
+        return cause_of(hum, hum.form("swinging"), values | dict(zip(names, line.swing, strict=True)))
+    if line.higher:
+        words = {5: "fifth", 7: "seventh"}
+        none = {"fifth": 0.0, "seventh": 0.0, "ratio": 0.0}
+        own = {words[order]: ratio for order, ratio, _ in line.higher}
+        own |= {f"{words[order]}_phase": angle for order, _, angle in line.higher}
+        return cause_of(hum, hum.form("flat_topped"), values | none | third | own)
+    if third:
         return cause_of(hum, hum.form("harmonics"), values | third)
     return cause_of(hum, hum.form("sine"), values)

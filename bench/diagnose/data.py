@@ -119,6 +119,8 @@ class Prepared:
     noise: ForceNoise
     hum: Line | None
     """What hums, and has been taken out of the force."""
+    hum_N: Array
+    """What was taken out (full.size,), N."""
     position_noise_mm: float
     sample_s: float
     doubt_mm: float
@@ -131,8 +133,7 @@ class Prepared:
         """`full` with the hum still in it."""
         if self.hum is None:
             return self.full
-        hum = self.hum.force_N(self.full.time_s - self.full.time_s[0])
-        return replace(self.full, force_N=self.full.force_N + np.where(self.full.weight > 0, hum, 0.0))
+        return replace(self.full, force_N=self.full.force_N + self.hum_N)
 
     @property
     def colour(self) -> Colour:
@@ -194,9 +195,12 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
             m.name, f"only {int(counted.sum())} force samples can be used", f"At least {FEWEST} are needed."
         )
     sample_s = float(np.median(np.diff(m.force_time_s)))
-    line = find(float(m.position_time_s[0]), sample_s, hold_errors(m, good))
+    begins_s = float(m.position_time_s[0])
+    line = find(begins_s, hold_errors(m, good), m.force_time_s, m.force_N)
+    taken_N = np.zeros(len(m.force_N))
     if line is not None:
-        m = replace(m, force_N=m.force_N - line.force_N(m.force_time_s - m.position_time_s[0]))
+        taken_N = line.force_N(m.force_time_s - begins_s, m.force_N)
+        m = replace(m, force_N=m.force_N - taken_N)
     motion = felt(m.position_time_s, m.position_mm)
     noise = force_noise(m, good)
     sigma_force = max(noise.force_N, resolution(m.force_N) / np.sqrt(12.0), 1e-9)
@@ -205,7 +209,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     stiffness = stiffness_along(m)
     through = stiffness * np.interp(m.force_time_s, motion.time_s, motion.std_mm)
     sigma, weight, force = np.full(len(grid), sigma_force), np.zeros(len(grid)), np.zeros(len(grid))
-    shared = np.zeros(len(grid))
+    shared, hum = np.zeros(len(grid)), np.zeros(len(grid))
     stretch = motion.stretch[np.clip(np.searchsorted(motion.time_s, grid, side="right") - 1, 0, None)]
     # a hold or a planned move is off as a whole; elsewhere windows of neighbours share what they share
     whole = np.where(stretch[where] > 0, 1.0, np.sqrt(0.5))
@@ -213,7 +217,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     sigma[where] = np.hypot(sigma_force, np.sqrt(1.0 - whole**2) * through)
     stretch = np.unique(stretch, return_inverse=True)[1]
     weight[where] = counted
-    force[where] = m.force_N
+    force[where], hum[where] = m.force_N, np.where(counted, taken_N, 0.0)
     position = np.interp(grid, time, position)
     depth = max(float(position.max()), 1e-3)
     full = Data(
@@ -233,6 +237,7 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
         good=good,
         noise=replace(noise, force_N=sigma_force),
         hum=line,
+        hum_N=hum,
         position_noise_mm=max(motion.noise_mm, 1.05 * resolution(m.position_mm)),
         sample_s=sample_s,
         doubt_mm=m.surface_std_mm,

@@ -17,7 +17,7 @@ from sim.model import Model
 from sim.pad import Pad
 
 from .channel import Faults, faults, not_of_the_motion, resting, standing_off, strays
-from .channel_causes import by_themselves, channel_causes, hum_cause, joined
+from .channel_causes import beyond_limit, by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS
 from .held_out import held_out_square, later_square
@@ -255,6 +255,9 @@ def _concluded(
         verdict = "explained" if explains(left, causes) else "unexplained"
     else:
         verdict = "unexplained" if told and excess[0] > TOLD * floor**2 else "consistent"
+    saturated = flags.saturated.copy()
+    saturated[prepared.kept] |= beyond_limit(raw, whole[1])[at]
+    flags = replace(flags, saturated=saturated)
     flagged = flags.flagged[prepared.kept]
     inside = m.counted()[prepared.kept]
     good = raw.weight[at] > 0

@@ -2,11 +2,15 @@
 
 It is taken out of the force before the search, which works on averages over blocks that hide it, and given back at the
 end: as a cause where it can come from the mains, else as something that nothing explains.
+
+A line beyond half the rate of sampling is seen folded. Of the frequencies that would look alike the one is taken that
+the stamps tell, as they are never quite even, or else the one that is nearest to what grids have.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,51 +22,82 @@ Array = NDArray[np.float64]
 
 LOWEST_HZ = 8.0
 MAINS_HZ, MULTIPLES = (45.0, 65.0), (1, 2, 3)
+GRIDS_HZ = (50.0, 60.0)
 LEVEL = 1e-5  # of a line by chance, over all frequencies
 LEAST_SHARE = 0.002  # of the noise power
+TOLD = 15.0  # times the noise power per sample: what a further number of the line must take
+HARMONICS = (3, 5, 7)
+WINDOW_S, FEWEST = 1.0, 20  # in which a line stands still while it swings slowly, and samples that tell of it there
+MOST_GROWTH = 2.0  # of the amplitude, from the least load of the holds to the greatest
 
 
 @dataclass(frozen=True)
 class Line:
     """Σ over harmonics (1, 3) of the sines found; `frequency_Hz`, `amplitude_N` and `phase_rad` of the first at t = 0,
-    `ratio` and `third_phase_rad` of the third (0 where there is none)."""
+    `ratio` and `third_phase_rad` of the third (0 where there is none). All grows by `growth_1_N`, of itself, with each
+    newton that the cell bears beyond `at_N`, where the amplitude is as stated. `higher`: (order, ratio, phase) of
+    further harmonics. `swing`: (period in s, swell, its phase, wander in rad, its phase), as in the effect's form."""
 
     frequency_Hz: float
     amplitude_N: float
     phase_rad: float
     ratio: float
     third_phase_rad: float
-
     sample_s: float = 1e-3
+    growth_1_N: float = 0.0
+    at_N: float = 0.0
+    higher: tuple[tuple[int, float, float], ...] = ()
+    swing: tuple[float, ...] = ()
 
     @property
     def of_the_mains(self) -> bool:
         """Whether the grid's frequency, or a low multiple of it, looks like this at this rate of sampling."""
-        step_Hz = (MAINS_HZ[1] - MAINS_HZ[0]) / 400.0
-        grid = np.outer(MULTIPLES, np.arange(MAINS_HZ[0], MAINS_HZ[1] + step_Hz, step_Hz)).ravel()
-        rate = 1.0 / self.sample_s
-        seen = np.abs(grid - rate * np.rint(grid / rate))
-        return bool(np.min(np.abs(seen - self.frequency_Hz)) <= 2.0 * step_Hz)
+        rate, step = 1.0 / self.sample_s, _grid_Hz()[1] - _grid_Hz()[0]
+        apart = np.abs(_folded(_grid_Hz(), rate) - _folded(self.frequency_Hz, rate))
+        return bool(np.min(apart) <= 2.0 * step)
 
-    def force_N(self, time_s: Array) -> Array:
-        """The line at times (n,) since its start."""
+    def force_N(self, time_s: Array, load_N: Array) -> Array:
+        """The line at times (n,) since its start, under loads (n,)."""
         angle = 2.0 * np.pi * self.frequency_Hz * time_s
-        third = self.ratio * np.sin(3.0 * angle + self.third_phase_rad)
-        return np.asarray(self.amplitude_N * (np.sin(angle + self.phase_rad) + third))
+        swells = self.amplitude_N * (1.0 + self.growth_1_N * (load_N - self.at_N))
+        first = angle + self.phase_rad
+        if self.swing:
+            period, swell, swell_phase, wander, wander_phase = self.swing
+            slow = 2.0 * np.pi * time_s / period
+            swells, first = (
+                swells * (1.0 + swell * np.sin(slow + swell_phase)),
+                first + wander * np.sin(slow + wander_phase),
+            )
+        others = [(3, self.ratio, self.third_phase_rad), *self.higher]
+        wave = np.sin(first) + sum(ratio * np.sin(order * angle + phase) for order, ratio, phase in others if ratio)
+        return np.asarray(swells * wave)
 
 
-def find(start_s: float, sample_s: float, parts: list[Part]) -> Line | None:
+def _grid_Hz() -> Array:
+    """Frequencies that a grid may have, and their low multiples."""
+    return np.outer(MULTIPLES, np.linspace(*MAINS_HZ, 401)).ravel()
+
+
+def _folded(frequency_Hz: Array | float, rate_Hz: float) -> Array:
+    """How frequencies look when they are sampled."""
+    frequency = np.asarray(frequency_Hz, dtype=np.float64)
+    return np.asarray(np.abs(frequency - rate_Hz * np.rint(frequency / rate_Hz)))
+
+
+def find(start_s: float, parts: list[Part], stamp_s: Array, force_N: Array) -> Line | None:
     """The strongest line in the holds, where it is beyond chance; phases count from `start_s`.
 
-    `sample_s`: time between force samples.
+    `stamp_s`, `force_N`: all force samples (m,).
     """
     if sum(len(e) for _, e, _ in parts) < 200:
         return None
-    t = np.concatenate([t for t, _, _ in parts]) - start_s
-    e = np.concatenate([e for _, e, _ in parts])
-    step = sample_s
+    stamps = np.concatenate([t for t, _, _ in parts])
+    t, e = stamps - start_s, np.concatenate([e for _, e, _ in parts])
+    step = _step(stamp_s)
     power, frequency = _spectrum(t, e, step)
-    usable = (frequency > LOWEST_HZ) & (frequency < 0.47 / step)
+    # nearer to half the rate a sine and a cosine are one within a hold
+    highest = 0.5 / step - 1.0 / max(float(t[-1] - t[0]) for t, _, _ in parts)
+    usable = (frequency > LOWEST_HZ) & (frequency < highest)
     if not usable.any():
         return None
     # against the noise around it, whatever its colour
@@ -73,22 +108,80 @@ def find(start_s: float, sample_s: float, parts: list[Part]) -> Line | None:
     if not lines.any():
         return None
     k = int(np.argmax(np.where(lines, power - around, -np.inf)))  # the strongest: a harmonic may stand out more
-    spacing = frequency[1] - frequency[0]
-    found = minimize_scalar(
-        lambda f: -_taken(t, e, f)[0], bounds=(frequency[k] - spacing, frequency[k] + spacing), method="bounded",
-        options={"xatol": spacing * 1e-3},
-    )  # fmt: skip
-    f = float(found.x)
+    spacing = float(frequency[1] - frequency[0])
+    least = TOLD * float(e @ e) / len(e)
+    f = _told(t, e, _unfolded(float(frequency[k]), 1.0 / step), spacing, least)
     taken, sine, cosine = _taken(t, e, f)
     if taken < LEAST_SHARE * float(e @ e):
         return None
     amplitude, phase = float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
-    ratio = third = 0.0
-    if 3.0 * f < 0.47 / step:
-        more, s3, c3 = _taken(t, e, 3.0 * f)
-        if more > 15.0 * float(e @ e) / len(e):
-            ratio, third = float(np.hypot(s3, c3)) / amplitude, float(np.arctan2(c3, s3))
-    return Line(f, amplitude, phase, ratio, third, step)
+    load = force_N[np.searchsorted(stamp_s, stamps)] - e
+    line = Line(f, amplitude, phase, 0.0, 0.0, step)
+    shapes = [_with_harmonics(line, t, e, least, highest, spacing)]
+    growth = _growth(t, e, f, load, least)
+    if growth:
+        at = float(np.mean(force_N))  # what is stated is the mean over the run
+        there = 1.0 + growth * (at - float(np.mean(load)))
+        shapes.append(replace(shapes[0], amplitude_N=amplitude * there, growth_1_N=growth / there, at_N=at, higher=()))
+    swinging = _swinging(line, parts, start_s)
+    shapes += [swinging] if swinging is not None else []
+    # the plainest, unless another one takes more than its numbers do by chance
+    return min(shapes, key=lambda one: float(np.sum((e - one.force_N(t, load)) ** 2)) + least * _numbers(one))
+
+
+def _numbers(line: Line) -> int:
+    return 2 * (line.ratio > 0.0) + 2 * len(line.higher) + (line.growth_1_N != 0.0) + len(line.swing)
+
+
+def _with_harmonics(line: Line, t: Array, e: Array, least: float, highest: float, spacing: float) -> Line:
+    """The line with those of its odd harmonics that are more than chance, and do not look like each other."""
+    f, rate = line.frequency_Hz, 1.0 / line.sample_s
+    seen, found = [float(_folded(f, rate))], []
+    for order in HARMONICS:
+        here = float(_folded(order * f, rate))
+        if LOWEST_HZ < here < highest and min(abs(here - other) for other in seen) > 16.0 * spacing:
+            more, sine, cosine = _taken(t, e, order * f)
+            if more > least:
+                seen.append(here)
+                found.append((order, float(np.hypot(sine, cosine)) / line.amplitude_N, float(np.arctan2(cosine, sine))))
+    third = next(((ratio, phase) for order, ratio, phase in found if order == 3), (0.0, 0.0))
+    return replace(line, ratio=third[0], third_phase_rad=third[1], higher=tuple(one for one in found if one[0] != 3))
+
+
+def _swinging(line: Line, parts: list[Part], start_s: float) -> Line | None:
+    """The line with amplitude and phase that swing slowly, as windows of the holds have them; None: too few windows."""
+    at, z = [], []
+    for stamps, e, _ in parts:
+        count = max(int((stamps[-1] - stamps[0]) / WINDOW_S), 1)
+        for own in np.array_split(np.arange(len(stamps)), count):
+            if len(own) >= FEWEST:
+                t = stamps[own] - start_s
+                _, sine, cosine = _taken(t, e[own], line.frequency_Hz)
+                at.append(float(t.mean()))
+                z.append(complex(sine, cosine))
+    if len(z) < 12:
+        return None
+    when, way = np.array(at), np.array(z)
+    angle, size = np.unwrap(np.angle(way)), np.abs(way)
+    span, best = float(when[-1] - when[0]), (np.inf, 0.0, np.zeros(7))
+    for cycles in np.arange(0.5, min(span / (4.0 * WINDOW_S), 40.0), 0.25):
+        slow = 2.0 * np.pi * cycles / span * when
+        A = np.stack([np.ones(len(when)), np.sin(slow), np.cos(slow), when / span], axis=1)
+        of_angle, of_size = (np.linalg.lstsq(B, y, rcond=None)[0] for B, y in ((A, angle), (A[:, :3], size)))
+        left = np.sum((size - A[:, :3] @ of_size) ** 2) + np.sum((size.mean() * (angle - A @ of_angle)) ** 2)
+        if left < best[0]:
+            best = (float(left), float(span / cycles), np.concatenate([of_angle, of_size]))
+    _, period, x = best
+    if not x[4] > 0.0:
+        return None
+    swell, wander = float(np.hypot(x[5], x[6])) / float(x[4]), float(np.hypot(x[1], x[2]))
+    return replace(
+        line,
+        frequency_Hz=line.frequency_Hz + float(x[3]) / span / (2.0 * np.pi),
+        amplitude_N=float(x[4]),
+        phase_rad=float(np.angle(np.exp(1j * x[0]))),
+        swing=(period, min(swell, 1.0), float(np.arctan2(x[6], x[5])), wander, float(np.arctan2(x[2], x[1]))),
+    )
 
 
 def _spectrum(t: Array, e: Array, step: float) -> tuple[Array, Array]:
@@ -115,3 +208,57 @@ def _taken(t: Array, e: Array, f: float) -> tuple[float, float, float]:
     A = np.stack([np.sin(angle), np.cos(angle)], axis=1)
     solution = np.linalg.lstsq(A, e, rcond=None)[0]
     return float(np.sum((A @ solution) ** 2)), float(solution[0]), float(solution[1])
+
+
+def _step(stamp_s: Array) -> float:
+    """Mean time between samples that follow each other; the median is off by a part of what stamps scatter."""
+    steps = np.diff(stamp_s)
+    return float(np.mean(steps[steps < 1.5 * np.median(steps)]))
+
+
+def _unfolded(seen_Hz: float, rate_Hz: float) -> list[float]:
+    """Frequencies of the mains that look like this one, nearest to a grid's first; itself, where there are none."""
+    highest = MULTIPLES[-1] * MAINS_HZ[1]
+    every = [abs(k * rate_Hz + sign * seen_Hz) for k in range(int(highest / rate_Hz) + 2) for sign in (1.0, -1.0)]
+    far = {f: off for f in every if (off := _off_grid(f)) is not None}
+    return sorted(far, key=lambda f: far[f]) or [seen_Hz]
+
+
+def _off_grid(frequency_Hz: float) -> float | None:
+    """How far a frequency is from what grids have or its low multiples, as a share; None: it is none of theirs."""
+    of = [frequency_Hz / multiple for multiple in MULTIPLES]
+    return min((abs(f / grid - 1.0) for f in of if MAINS_HZ[0] <= f <= MAINS_HZ[1] for grid in GRIDS_HZ), default=None)
+
+
+def _told(t: Array, e: Array, candidates: Sequence[float], spacing: float, least: float) -> float:
+    """Of frequencies that look alike the first, unless another one takes more than by chance (`least`)."""
+    best, most = candidates[0], -np.inf
+    for candidate in candidates:
+        found = _closest(t, e, candidate, spacing)
+        if found[1] > most + (least if most > -np.inf else 0.0):
+            best, most = found
+    return best
+
+
+def _closest(t: Array, e: Array, f: float, spacing: float) -> tuple[float, float]:
+    """(the frequency close to one at which a sine takes the most, what it takes)."""
+    found = minimize_scalar(
+        lambda f: -_taken(t, e, f)[0], bounds=(f - spacing, f + spacing), method="bounded",
+        options={"xatol": spacing * 1e-3},
+    )  # fmt: skip
+    return float(found.x), -float(found.fun)
+
+
+def _growth(t: Array, e: Array, f: float, load: Array, least: float) -> float:
+    """By how much of itself, as it is at the mean load, a line grows with each newton; 0 where that is no more than
+    chance."""
+    span = float(np.ptp(load))
+    if span <= 0.0:
+        return 0.0
+    angle, along = 2.0 * np.pi * f * t, (load - load.mean()) / span
+    waves = np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    A = np.hstack([waves, along[:, None] * waves])
+    x = np.linalg.lstsq(A, e, rcond=None)[0]
+    taken = float(np.sum((A @ x) ** 2)) - _taken(t, e, f)[0]
+    growth = float(x[:2] @ x[2:] / (x[:2] @ x[:2]))  # in phase with the line itself
+    return growth / span if taken > least and abs(growth) < MOST_GROWTH else 0.0

@@ -23,6 +23,7 @@ from .evidence import Evidence, believable, evidence_of, least_gain, penalty, un
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, extended, force_at, jacobian, mean_square, reduced, refit
+from .shapes import departed
 
 Array = NDArray[np.float64]
 
@@ -176,7 +177,8 @@ class Search:
         return self._plainer(fit, sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score))
 
     def _plainer(self, fit: Fit, ranked: list[Trial]) -> list[Trial]:
-        """First the one of fewest numbers, where what it leaves more is little beside what the best leaves too."""
+        """First the one of fewest numbers, and of as many the first form of its family, where what it leaves more is
+        little beside what the best leaves too."""
         if not ranked:
             return ranked
         best = ranked[0].fit
@@ -184,9 +186,12 @@ class Search:
 
         def as_good(t: Trial) -> bool:
             more = t.fit.chi2 - best.chi2
-            return t.fit.free < best.free and more < ALIKE * gained and more < ALIKE_LEFT * beyond
+            return plainness(t) < plainness(ranked[0]) and more < ALIKE * gained and more < ALIKE_LEFT * beyond
 
-        plain = min((t for t in ranked[1:] if as_good(t)), key=lambda t: t.fit.free, default=None)
+        def plainness(t: Trial) -> tuple[int, bool]:
+            return t.fit.free, not _usual(t)
+
+        plain = min((t for t in ranked[1:] if as_good(t)), key=plainness, default=None)
         return ranked if plain is None else [plain, *(t for t in ranked if t is not plain)]
 
     def _relaxing_as(self, best: Trial, trial: Trial) -> list[Trial]:
@@ -210,7 +215,10 @@ class Search:
         for id_ in [i for i in LATE if i in family and i != best.id]:
             # with the bounds of physics: a mode beyond what the sampling resolves is late, and no more
             own = effects.effect(id_)
-            late = [cause_of(own, own.forms[0], values) for values in as_late(id_, late_s)]
+            shapes = [own.forms[0]]
+            if id_ == "sensor_lag" and unexplained(best.fit.chi2, self.expected) > 0.0:  # the usual ones are not it
+                shapes += [form for form in own.forms if not form.sought]
+            late = [cause_of(own, shape, values) for shape in shapes for values in as_late(id_, late_s)]
             tried = [t for t in (self._joined(fit, cause, MORE, None) for cause in late) if t is not None]
             if tried:
                 again = self._carried(min(tried, key=lambda t: t.score), ALL)
@@ -426,8 +434,9 @@ class Search:
                 begun += [(without, s.cause) for s in starts(signatures, effect, form)]
                 trials = [self._joined(*start, MORE, None) for start in begun]
                 tried += [t for t in trials if t is not None]
-        tried = [self._carried(t, ALL) for t in sorted(tried, key=lambda t: t.score)[:2]]
-        return min([now, *(t.fit for t in tried)], key=lambda fit: fit.chi2)
+        fits = [self._carried(t, ALL).fit for t in sorted(tried, key=lambda t: t.score)[:2]]
+        others = [fit for fit in fits if not departed(fit, len(fit.structure.causes) - 1)]
+        return min([now, *others], key=lambda fit: fit.chi2)
 
     def settled(self, now: Fit, joined: Fit) -> Fit:
         """The fit before a cause was added, or a better one that the addition has led to: a valley may be long."""

@@ -23,6 +23,7 @@ STEPS, STARTS = 8, 12  # of the fit of another shape
 FEW, TRIED = 3, 2  # steps of the best starts
 NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
+EDGE = 1e-6  # within which a coordinate is at its bound
 WORKERS = 2
 
 
@@ -91,10 +92,23 @@ def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
     for index in range(own, len(kept)):
         members = families(short, taken, [index])[0]
         score = scores(short, members)
-        best = int(np.argmin(score))
-        if best > 0:
-            taken = refit(short, members[best].fit.structure, members[best].fit.x, END, 1e-8)
+        for best in np.argsort(score, kind="stable").tolist():
+            if best == 0:
+                break
+            other = refit(short, members[best].fit.structure, members[best].fit.x, END, 1e-8)
+            if not departed(other, index):
+                taken = other
+                break
     return fit if taken is lead else taken
+
+
+def departed(fit: Fit, index: int) -> bool:
+    """Whether a cause differs from the first of its family by as much as the family allows (a number of either sign,
+    0 by default, at its bound): then it is another cause's shape, of which this one makes what it can."""
+    at = fit.structure.of_cause(index)
+    departures = [p.default == 0.0 and p.lower == -p.upper for p in fit.structure.causes[index].fitted]
+    x, lower, upper = fit.x[at], fit.structure.lower[at], fit.structure.upper[at]
+    return bool(np.any(np.array(departures) & ((x <= lower + EDGE) | (x >= upper - EDGE))))
 
 
 def _comparable(one: Form, other: Form) -> bool:
@@ -126,7 +140,8 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     if not tried:
         return None
     best = min(tried, key=lambda fit: fit.chi2)
-    return Member(refit(short, best.structure, best.x, STEPS, NEARLY), index)
+    member = Member(refit(short, best.structure, best.x, STEPS, NEARLY), index)
+    return None if departed(member.fit, index) else member
 
 
 def _reach(short: Data, structure: Structure) -> Reach:

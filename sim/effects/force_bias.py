@@ -6,11 +6,14 @@ From a tare while something touched, a cable that pulls, a probe changed after t
 - `settling`: bias · (1 + share e^(−t/τ)), as after a tare while the cell still crept.
 - `slipping`: bias · (1 + share (s(t) − ½)), s a logistic step from 0 to 1 at a time, as when a cable comes to lie
   elsewhere.
+- `along`: bias · (1 + share (y/reach − ½)) at the probe's position y, as of a cable or tube that is pulled along: it is
+  a weak spring. It hangs free further than half the reach beyond either end.
 
 The share is small: a zero that moves by more of itself than that drifts. A drift begins at zero; a bias is there from
 the first sample on.
 
-Reference: OIML R 60, Metrological regulation for load cells (zero, its return after load, and its shift).
+Reference: OIML R 60, Metrological regulation for load cells (zero, its return after load, and its shift); VDI/VDE 2637
+part 1, Load cells (force shunts by cables and lines).
 """
 
 from __future__ import annotations
@@ -41,6 +44,12 @@ def slipping(dt: float, force: float, state: State, p: State) -> float:
     """State: time since the first sample; p = (bias, share, moved_at, within)."""
     state[0] += dt
     return force + p[0] * (1.0 + 0.5 * p[1] * math.tanh((state[0] - p[2]) / p[3]))
+
+
+@block
+def along(dt: float, y: float, state: State, p: State) -> float:
+    """Force at the probe; p = (bias, share, reach)."""
+    return p[0] * (1.0 + p[1] * (min(max(y / p[2], -0.5), 1.5) - 0.5))
 
 
 _BIAS = Parameter(
@@ -92,6 +101,17 @@ EFFECT = Effect(
             sought=False,
             blocks={"sensor": slipping},
             state=(0.0,),
+        ),
+        Form(
+            name="along",
+            what="a little more or less at the end of the way",
+            parameters=(
+                _BIAS,
+                _share("what there is more of it at the end of the way than at its begin"),
+                Parameter("reach", "mm", 0.01, 1e3, 3.0, "depth at the end of the way", fixed=True),
+            ),
+            sought=False,
+            blocks={"probe": along},
         ),
     ),
 )

@@ -7,7 +7,10 @@ first sample in all forms.
 - `settling`: rate · τ (1 − e^(−t/τ)), one thermal time constant.
 - `root`: rate · 2τ (√(1 + t/τ) − 1), as heat that diffuses in.
 - `logarithmic`: rate · τ ln(1 + t/τ), as creep of glue and gauge.
+- `hyperbolic`: rate · t/(1 + t/τ), as recovery by many processes of which each is slower than the last.
 - `turning`: rate · (2τ/π) sin(πt/2τ), as a room that warms and cools: it turns at τ.
+- `bent`: rate · t until a time, and a share of that rate from there on, as where a door is opened or a heater goes off.
+- `quickening`: rate · t (1 + t/2τ), as a supply that ends: twice as quick at τ.
 
 Reference: OIML R 60, Metrological regulation for load cells (creep, and temperature effect on the dead load output).
 """
@@ -49,11 +52,32 @@ def logarithmic(dt: float, force: float, state: State, p: State) -> float:
 
 
 @block
+def hyperbolic(dt: float, force: float, state: State, p: State) -> float:
+    """To a limit, slowly; p = (rate, time_constant)."""
+    state[0] += dt
+    return force + p[0] * state[0] / (1.0 + state[0] / p[1])
+
+
+@block
 def turning(dt: float, force: float, state: State, p: State) -> float:
     """Sine of time; p = (rate, time_constant)."""
     state[0] += dt
     slow = 0.5 * math.pi / p[1]
     return force + p[0] / slow * math.sin(slow * state[0])
+
+
+@block
+def quickening(dt: float, force: float, state: State, p: State) -> float:
+    """Quicker and quicker; p = (rate, time_constant)."""
+    state[0] += dt
+    return force + p[0] * state[0] * (1.0 + 0.5 * state[0] / p[1])
+
+
+@block
+def bent(dt: float, force: float, state: State, p: State) -> float:
+    """Steady, and steady otherwise from a time on; p = (rate, share, moved_at)."""
+    state[0] += dt
+    return force + p[0] * (min(state[0], p[2]) + p[1] * max(state[0] - p[2], 0.0))
 
 
 _RATE = Parameter("rate", "N/s", -100.0, 100.0, 0.002, "rate at the first sample", required=True, amplitude=True)
@@ -93,11 +117,39 @@ EFFECT = Effect(
             state=(0.0,),
         ),
         Form(
+            name="hyperbolic",
+            what="to a limit that it is long in reaching",
+            parameters=(_RATE, _time_constant("time in which it is half way")),
+            sought=False,
+            blocks={"sensor": hyperbolic},
+            state=(0.0,),
+        ),
+        Form(
             name="turning",
             what="turns back, as the warmth of a room",
             parameters=(_RATE, _time_constant("time after which it turns")),
             sought=False,
             blocks={"sensor": turning},
+            state=(0.0,),
+        ),
+        Form(
+            name="quickening",
+            what="quicker and quicker, as a supply that ends",
+            parameters=(_RATE, _time_constant("time after which it is twice as quick")),
+            sought=False,
+            blocks={"sensor": quickening},
+            state=(0.0,),
+        ),
+        Form(
+            name="bent",
+            what="steady, and at another rate from a time on",
+            parameters=(
+                _RATE,
+                Parameter("share", "1", -3.0, 3.0, 0.3, "rate after it over the rate before"),
+                Parameter("moved_at", "s", 0.0, 1e6, 30.0, "time at which it changes, from the first sample on"),
+            ),
+            sought=False,
+            blocks={"sensor": bent},
             state=(0.0,),
         ),
     ),

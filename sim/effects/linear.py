@@ -1,10 +1,11 @@
-"""Exact steps of linear second-order systems, for the blocks of several effects. No effect itself."""
+"""Exact steps of linear systems of first and second order, for the blocks of several effects. No effect itself."""
 
 from __future__ import annotations
 
 import math
 
 from sim.jit import compiled
+from sim.kernel import ramp_gain
 
 
 @compiled("UniTuple(float64, 2)(float64, float64, float64, float64, float64)")
@@ -29,3 +30,14 @@ def low_pass(
     lag = 2.0 * damping * slope / omega
     e, de = swing(dt, y - before + lag, v - slope, omega, damping)
     return u - lag + e, slope + de
+
+
+@compiled("float64(float64, float64, float64, float64, float64)")
+def first_order(dt: float, y: float, before: float, u: float, tau: float) -> float:
+    """Output y of 1/(1 + τs), the input going linearly from `before` to `u` in dt."""
+    if dt <= 0.0:
+        return y
+    x = dt / tau
+    gain = ramp_gain(x)
+    decay = 1.0 - x * gain
+    return decay * y + (gain - decay) * before + (1.0 - gain) * u

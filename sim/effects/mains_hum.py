@@ -1,8 +1,20 @@
 """Mains hum: a sine in time on the force, from the mains through cable and ground.
 
-Phases are at the first sample. `harmonics` adds the third harmonic, which rectifiers and saturated transformers make.
+Phases are at the first sample.
 
-Reference: H. W. Ott, Noise Reduction Techniques in Electronic Systems, 2nd ed., Wiley, 1988.
+- `sine`: amplitude · sin(2πft + phase).
+- `harmonics`: with the third harmonic, which rectifiers and saturated transformers make.
+- `flat_topped`: with the third, the fifth and the seventh, as rectifiers make that draw from the crests alone.
+- `swinging`: amplitude and phase swing slowly, amplitude · (1 + swell · sin(2πt/period + …)) ·
+  sin(2πft + phase + wander · sin(2πt/period + …)), as the grid's frequency does and what else it feeds.
+- `loaded`, `loaded_harmonics`: the same, times 1 + growth · (F − at_force) of the force F at the cell. A bridge
+  multiplies its supply by its load, so ripple of the supply is hum that grows with the force; what comes by the cable
+  and the bridge's own zero does not grow.
+
+Reference: H. W. Ott, Noise Reduction Techniques in Electronic Systems, 2nd ed., Wiley, 1988; E. O. Doebelin,
+Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 4 (bridges: output over excitation);
+IEC 61000-3-2, Limits for harmonic current emissions; P. Kundur, Power System Stability and Control, McGraw-Hill, 1994,
+chapter 11 (the grid's frequency).
 """
 
 from __future__ import annotations
@@ -29,6 +41,41 @@ def harmonics(dt: float, force: float, state: State, p: State) -> float:
     return force + p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(3.0 * angle + p[4]))
 
 
+@block
+def flat_topped(dt: float, force: float, state: State, p: State) -> float:
+    """Force with the hum; p = (amplitude, frequency, phase), then (ratio, phase) of the third, fifth and seventh."""
+    state[0] += dt
+    angle = 2.0 * math.pi * p[1] * state[0]
+    wave = math.sin(angle + p[2]) + p[3] * math.sin(3.0 * angle + p[4])
+    return force + p[0] * (wave + p[5] * math.sin(5.0 * angle + p[6]) + p[7] * math.sin(7.0 * angle + p[8]))
+
+
+@block
+def swinging(dt: float, force: float, state: State, p: State) -> float:
+    """p = (amplitude, frequency, phase, period, swell, swell_phase, wander, wander_phase)."""
+    state[0] += dt
+    slow = 2.0 * math.pi * state[0] / p[3]
+    angle = 2.0 * math.pi * p[1] * state[0] + p[2] + p[6] * math.sin(slow + p[7])
+    return force + p[0] * (1.0 + p[4] * math.sin(slow + p[5])) * math.sin(angle)
+
+
+@block
+def loaded(dt: float, force: float, state: State, p: State) -> float:
+    """Force with the hum; p = (amplitude, frequency, phase, growth, at_force)."""
+    state[0] += dt
+    swells = p[0] * (1.0 + p[3] * (force - p[4]))
+    return force + swells * math.sin(2.0 * math.pi * p[1] * state[0] + p[2])
+
+
+@block
+def loaded_harmonics(dt: float, force: float, state: State, p: State) -> float:
+    """Force with the hum; p = (amplitude, frequency, phase, ratio, third_phase, growth, at_force)."""
+    state[0] += dt
+    angle = 2.0 * math.pi * p[1] * state[0]
+    swells = p[0] * (1.0 + p[5] * (force - p[6]))
+    return force + swells * (math.sin(angle + p[2]) + p[3] * math.sin(3.0 * angle + p[4]))
+
+
 _AMPLITUDE = Parameter(
     "amplitude",
     "N",
@@ -43,6 +90,28 @@ _AMPLITUDE = Parameter(
 _FREQUENCY = Parameter(
     "frequency", "Hz", 0.1, 2000.0, 50.0, "frequency", required=True, starts=(50.0, 60.0, 100.0, 120.0)
 )
+_PHASE = phase("phase", "phase at the first sample")
+_THIRD = (
+    Parameter("ratio", "1", 0.0, 3.0, 0.3, "third harmonic over the first"),
+    phase("third_phase", "phase of the third harmonic at the first sample"),
+)
+_HIGHER = (
+    Parameter("fifth", "1", 0.0, 3.0, 0.1, "fifth harmonic over the first"),
+    phase("fifth_phase", "phase of the fifth harmonic at the first sample"),
+    Parameter("seventh", "1", 0.0, 3.0, 0.05, "seventh harmonic over the first"),
+    phase("seventh_phase", "phase of the seventh harmonic at the first sample"),
+)
+_SWING = (
+    Parameter("period", "s", 0.5, 1e4, 30.0, "time of a swing"),
+    Parameter("swell", "1", 0.0, 1.0, 0.1, "how far the amplitude swings, of itself"),
+    phase("swell_phase", "phase of that at the first sample"),
+    Parameter("wander", "rad", 0.0, 20.0, 0.1, "how far the phase swings"),
+    phase("wander_phase", "phase of that at the first sample"),
+)
+_LOAD = (
+    Parameter("growth", "1/N", -1e3, 1e3, 0.1, "by how much of itself it grows with each newton of load"),
+    Parameter("at_force", "N", -1e5, 1e5, 0.0, "force at which the amplitude is as stated", fixed=True),
+)
 
 EFFECT = Effect(
     id="mains_hum",
@@ -54,21 +123,47 @@ EFFECT = Effect(
         Form(
             name="sine",
             what="one sine",
-            parameters=(_AMPLITUDE, _FREQUENCY, phase("phase", "phase at the first sample")),
+            parameters=(_AMPLITUDE, _FREQUENCY, _PHASE),
             blocks={"sensor": sine},
             state=(0.0,),
         ),
         Form(
             name="harmonics",
             what="a sine and its third harmonic",
-            parameters=(
-                _AMPLITUDE,
-                _FREQUENCY,
-                phase("phase", "phase at the first sample"),
-                Parameter("ratio", "1", 0.0, 3.0, 0.3, "third harmonic over the first"),
-                phase("third_phase", "phase of the third harmonic at the first sample"),
-            ),
+            parameters=(_AMPLITUDE, _FREQUENCY, _PHASE, *_THIRD),
             blocks={"sensor": harmonics},
+            state=(0.0,),
+        ),
+        Form(
+            name="flat_topped",
+            what="a sine and three odd harmonics",
+            parameters=(_AMPLITUDE, _FREQUENCY, _PHASE, *_THIRD, *_HIGHER),
+            sought=False,
+            blocks={"sensor": flat_topped},
+            state=(0.0,),
+        ),
+        Form(
+            name="swinging",
+            what="a sine of which amplitude and phase swing slowly",
+            parameters=(_AMPLITUDE, _FREQUENCY, _PHASE, *_SWING),
+            sought=False,
+            blocks={"sensor": swinging},
+            state=(0.0,),
+        ),
+        Form(
+            name="loaded",
+            what="a sine that grows with the load, as ripple of the bridge's supply",
+            parameters=(_AMPLITUDE, _FREQUENCY, _PHASE, *_LOAD),
+            sought=False,
+            blocks={"sensor": loaded},
+            state=(0.0,),
+        ),
+        Form(
+            name="loaded_harmonics",
+            what="a sine and its third harmonic, both growing with the load",
+            parameters=(_AMPLITUDE, _FREQUENCY, _PHASE, *_THIRD, *_LOAD),
+            sought=False,
+            blocks={"sensor": loaded_harmonics},
             state=(0.0,),
         ),
     ),

@@ -5,11 +5,21 @@ The damping ratio ends at 0.5: beyond, a second-order low-pass has next to no pe
 - `low_pass`: all of the force passes ω²/(s² + 2ζω s + ω²).
 - `partial`: a share of it does, the rest passes as it is: a mode of part of the structure, which adds a ringing at each
   sudden change and nothing to what is slow.
+- `transmitted`: the damper stands beside the spring and bears too, (2ζω s + ω²)/(s² + 2ζω s + ω²). It comes no later
+  than a ramp in the end.
+- `amplifier`: a pole at `ratio` times ω comes after the mode, as of an amplifier whose bandwidth is not far above it.
+- `pair`: the rest passes another mode of the same damping, at `ratio` times the frequency.
+- `antiresonance`: zeros at `ratio` times the frequency and of the same damping, where a part of the structure absorbs
+  the motion of the rest.
+- `loaded`: ω² goes with the force that is borne, ω² (1 + growth (F/at_force − 1)), and not below a fifth: cells and
+  joints are stiffer or softer under load. The stiffness stands still within a step.
 
-Exact for a force that is linear between samples, at any spacing.
+Exact for a force that is linear between samples, at any spacing, but for the last.
 
 Reference: W. T. Thomson, Theory of Vibration with Applications, 4th ed., Prentice Hall, 1993; E. O. Doebelin,
-Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3.
+Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3; J. P. Den Hartog, Mechanical
+Vibrations, 4th ed., McGraw-Hill, 1956, section 2.12 (transmissibility); D. J. Ewins, Modal Testing, 2nd ed., Research
+Studies Press, 2000, chapter 2 (modes side by side, antiresonances).
 """
 
 from __future__ import annotations
@@ -17,10 +27,11 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.linear import first_order
 from sim.effects.linear import low_pass as exact
 from sim.jit import State, block
 
-_Y, _SPEED, _LAST, _STARTED = range(4)
+_Y, _SPEED, _LAST, _STARTED, _AFTER, _AFTER_SPEED = range(6)
 
 
 @block
@@ -49,6 +60,93 @@ def partial(dt: float, u: float, state: State, p: State) -> float:
     state[_SPEED] = speed
     state[_LAST] = u
     return u + p[2] * (y - u)
+
+
+@block
+def transmitted(dt: float, u: float, state: State, p: State) -> float:
+    """Force that spring and damper of the mode pass on; p = (frequency, damping_ratio)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_LAST] = u
+    omega = 2.0 * math.pi * p[0]
+    y, speed = exact(dt, state[_Y], state[_SPEED], state[_LAST], u, omega, p[1])
+    state[_Y] = y
+    state[_SPEED] = speed
+    state[_LAST] = u
+    return y + 2.0 * p[1] / omega * speed
+
+
+@block
+def amplifier(dt: float, u: float, state: State, p: State) -> float:
+    """Force after the mode and a pole at ratio · ω, by partial fractions; p = (frequency, damping_ratio, ratio)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_LAST] = u
+        state[_AFTER] = u
+    omega = 2.0 * math.pi * p[0]
+    y, speed = exact(dt, state[_Y], state[_SPEED], state[_LAST], u, omega, p[1])
+    after = first_order(dt, state[_AFTER], state[_LAST], u, 1.0 / (p[2] * omega))
+    state[_Y] = y
+    state[_SPEED] = speed
+    state[_AFTER] = after
+    state[_LAST] = u
+    share = 1.0 / (1.0 - 2.0 * p[1] * p[2] + p[2] * p[2])
+    return y + share * (after - y - p[2] / omega * speed)
+
+
+@block
+def pair(dt: float, u: float, state: State, p: State) -> float:
+    """Force that passes two modes side by side; p = (frequency, damping_ratio, share, ratio)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_LAST] = u
+        state[_AFTER] = u
+    omega = 2.0 * math.pi * p[0]
+    y, speed = exact(dt, state[_Y], state[_SPEED], state[_LAST], u, omega, p[1])
+    other, other_speed = exact(dt, state[_AFTER], state[_AFTER_SPEED], state[_LAST], u, p[3] * omega, p[1])
+    state[_Y] = y
+    state[_SPEED] = speed
+    state[_AFTER] = other
+    state[_AFTER_SPEED] = other_speed
+    state[_LAST] = u
+    return other + p[2] * (y - other)
+
+
+@block
+def antiresonance(dt: float, u: float, state: State, p: State) -> float:
+    """Force after a pair of poles and a pair of zeros; p = (frequency, damping_ratio, ratio)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_LAST] = u
+    omega = 2.0 * math.pi * p[0]
+    y, speed = exact(dt, state[_Y], state[_SPEED], state[_LAST], u, omega, p[1])
+    state[_Y] = y
+    state[_SPEED] = speed
+    state[_LAST] = u
+    rate = 2.0 * p[1] * speed / omega
+    return y + rate / p[2] + (u - y - rate) / (p[2] * p[2])
+
+
+@block
+def loaded(dt: float, u: float, state: State, p: State) -> float:
+    """Force after a mode whose stiffness goes with it; p = (frequency, damping_ratio, growth, at_force)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_LAST] = u
+    borne = min(max(0.5 * (u + state[_LAST]) / p[3], 0.0), 2.0)
+    stiffer = math.sqrt(max(1.0 + p[2] * (borne - 1.0), 0.2))
+    y, speed = exact(
+        dt, state[_Y], state[_SPEED], state[_LAST], u, 2.0 * math.pi * p[0] * stiffer, min(p[1] / stiffer, 0.99)
+    )
+    state[_Y] = y
+    state[_SPEED] = speed
+    state[_LAST] = u
+    return y
 
 
 _FREQUENCY = Parameter(
@@ -91,6 +189,64 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"sensor": partial},
+            state=(0.0,) * 4,
+        ),
+        Form(
+            name="transmitted",
+            what="spring and damper of the mode pass the force",
+            parameters=(_FREQUENCY, _DAMPING),
+            sought=False,
+            blocks={"sensor": transmitted},
+            state=(0.0,) * 4,
+        ),
+        Form(
+            name="amplifier",
+            what="the mode, and a first-order lag after it",
+            parameters=(
+                _FREQUENCY,
+                _DAMPING,
+                Parameter("ratio", "1", 0.5, 20.0, 3.0, "corner of the lag over the natural frequency"),
+            ),
+            sought=False,
+            blocks={"sensor": amplifier},
+            state=(0.0,) * 5,
+        ),
+        Form(
+            name="pair",
+            what="two modes, each for a share of the force",
+            parameters=(
+                _FREQUENCY,
+                _DAMPING,
+                Parameter("share", "1", 0.5, 1.0, 0.65, "share of the force that passes the mode stated"),
+                Parameter("ratio", "1", 0.3, 4.0, 1.2, "frequency of the other mode over it", starts=(1.2, 2.4)),
+            ),
+            sought=False,
+            blocks={"sensor": pair},
+            state=(0.0,) * 6,
+        ),
+        Form(
+            name="antiresonance",
+            what="the mode, and another part that absorbs it above",
+            parameters=(
+                _FREQUENCY,
+                _DAMPING,
+                Parameter("ratio", "1", 1.05, 10.0, 1.8, "frequency of the antiresonance over the mode's"),
+            ),
+            sought=False,
+            blocks={"sensor": antiresonance},
+            state=(0.0,) * 4,
+        ),
+        Form(
+            name="loaded",
+            what="the mode is stiffer or softer under load",
+            parameters=(
+                _FREQUENCY,
+                _DAMPING,
+                Parameter("growth", "1", -0.8, 0.8, 0.2, "growth of the stiffness from no load to the force stated"),
+                Parameter("at_force", "N", 1e-3, 1e5, 5.0, "force at which the frequency is as stated", fixed=True),
+            ),
+            sought=False,
+            blocks={"sensor": loaded},
             state=(0.0,) * 4,
         ),
     ),

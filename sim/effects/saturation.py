@@ -2,9 +2,12 @@
 
 - `hard`: at ±limit.
 - `upper`: at +limit alone.
+- `stop`: beyond +limit an overload stop bears beside the cell, which feels a share of what is more, as the stiffnesses
+  of both have it.
 - `soft`: a knee, u/(1 + |u/limit|^sharpness)^(1/sharpness): an amplifier near its rails.
 
-Reference: H. K. Khalil, Nonlinear Systems, 3rd ed., Prentice Hall, 2002, section 1.2 (common nonlinearities).
+Reference: H. K. Khalil, Nonlinear Systems, 3rd ed., Prentice Hall, 2002, section 1.2 (common nonlinearities); E. O.
+Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 5 (overload stops).
 """
 
 from __future__ import annotations
@@ -23,6 +26,12 @@ def hard(dt: float, force: float, state: State, p: State) -> float:
 def upper(dt: float, force: float, state: State, p: State) -> float:
     """No more than +limit; p = (limit,)."""
     return min(p[0], force)
+
+
+@block
+def stop(dt: float, force: float, state: State, p: State) -> float:
+    """A share of what is beyond +limit; p = (limit, passes)."""
+    return force if force <= p[0] else p[0] + p[1] * (force - p[0])
 
 
 @block
@@ -48,6 +57,16 @@ EFFECT = Effect(
     forms=(
         Form(name="hard", what="on both sides", parameters=(_LIMIT,), blocks={"sampling": hard}),
         Form(name="upper", what="in compression alone", parameters=(_LIMIT,), blocks={"sampling": upper}),
+        Form(
+            name="stop",
+            what="in compression, where a stop bears with the cell",
+            parameters=(
+                _LIMIT,
+                Parameter("passes", "1", 0.0, 0.5, 0.05, "share of what is beyond that the cell feels"),
+            ),
+            sought=False,
+            blocks={"sampling": stop},
+        ),
         Form(
             name="soft",
             what="with a knee",

@@ -4,15 +4,21 @@ In all forms `time_constant` is how far the output comes behind a ramp in the en
 value. Each is exact for a force that is linear between samples, at any spacing.
 
 - `first_order`: 1/(1 + τs).
+- `partly`: 1 − σ + σ/(1 + τs/σ), a share σ of the force late and the rest at once: lag and lead of a divider with a
+  capacitor, (1 + (1 − σ)τs/σ)/(1 + τs/σ).
 - `two_poles`: critically damped, 1/(1 + τs/2)².
 - `butterworth`: second order without a peak, damping ratio 1/√2, ω = √2/τ.
+- `three_poles`: after Butterworth, 1/((1 + s/ω)(1 + s/ω + s²/ω²)) with ω = 2/τ, which overshoots by 8 %.
+- `chebyshev`: four poles after Chebyshev with a ripple of 0.5 dB, as in front of converters: nearly a delay, and a
+  ringing after it.
 - `moving_average`: the mean over the last 2τ.
 - `decimator`: the mean over 2wτ around the time τ ago. With w = 1/√3 delay and width are those of three running means
   in a row, as of a converter's sinc³ decimator (E. B. Hogenauer, IEEE Trans. Acoust. Speech Signal Process. 29, 1981,
   155–162).
 
 Reference: E. O. Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3 (first
-and second order instruments and their response to a ramp).
+and second order instruments and their response to a ramp); A. I. Zverev, Handbook of Filter Synthesis, Wiley, 1967
+(poles after Chebyshev).
 """
 
 from __future__ import annotations
@@ -21,11 +27,11 @@ import math
 from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.linear import first_order as lagged
 from sim.effects.linear import low_pass
 from sim.jit import State, block
-from sim.kernel import ramp_gain
 
-_Y, _LAST, _STARTED, _Y2 = range(4)
+_Y, _LAST, _STARTED, _Y2, _V, _V2 = range(6)
 
 
 @block
@@ -34,13 +40,24 @@ def first_order(dt: float, u: float, state: State, p: State) -> float:
     if state[_STARTED] == 0.0 or p[0] <= 0.0:
         state[_STARTED] = 1.0
         state[_Y] = u
-    elif dt > 0.0:
-        x = dt / p[0]
-        gain = ramp_gain(x)
-        decay = 1.0 - x * gain
-        state[_Y] = decay * state[_Y] + (gain - decay) * state[_LAST] + (1.0 - gain) * u
+    else:
+        y = lagged(dt, state[_Y], state[_LAST], u, p[0])
+        state[_Y] = y
     state[_LAST] = u
     return state[_Y]
+
+
+@block
+def partly(dt: float, u: float, state: State, p: State) -> float:
+    """A share passes a lag of τ/share, the rest at once; p = (time_constant, share)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+    else:
+        y = lagged(dt, state[_Y], state[_LAST], u, p[0] / p[1])
+        state[_Y] = y
+    state[_LAST] = u
+    return u + p[1] * (state[_Y] - u)
 
 
 @block
@@ -76,6 +93,73 @@ def butterworth(dt: float, u: float, state: State, p: State) -> float:
         state[_Y2] = v
     state[_LAST] = u
     return state[_Y]
+
+
+@block
+def three_poles(dt: float, u: float, state: State, p: State) -> float:
+    """Third order after Butterworth, by partial fractions: 1/(1 + s) − s/(1 + s + s²); p = (time_constant,)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_Y2] = u
+        state[_V2] = 0.0
+        state[_LAST] = u
+        return u
+    omega = 2.0 / p[0]
+    y = lagged(dt, state[_Y], state[_LAST], u, 1.0 / omega)
+    y2, v2 = low_pass(dt, state[_Y2], state[_V2], state[_LAST], u, omega, 0.5)
+    state[_Y] = y
+    state[_Y2] = y2
+    state[_V2] = v2
+    state[_LAST] = u
+    return y - v2 / omega
+
+
+def _modes(poles: list[complex]) -> list[tuple[float, float, float, float]]:
+    """Of poles, one of each pair, scaled to a delay of 1 in all: (ω, ζ, share of the mode's output, of its speed).
+
+    By partial fractions: Π −p over Π (s − p) is the sum over pairs of (b s + a)/(s² + 2ζω s + ω²).
+    """
+    every = [q for p in poles for q in (p, p.conjugate())]
+    delay = sum(-1.0 / p for p in every).real
+    every = [delay * p for p in every]
+    gain = math.prod((abs(delay * p) ** 2 for p in poles), start=1.0)
+    out = []
+    for p in (delay * p for p in poles):
+        rest = math.prod(((p - q) for q in every if q != p), start=complex(1.0))
+        residue, omega = gain / rest, abs(p)
+        a, b = -2.0 * (residue * p.conjugate()).real, 2.0 * residue.real
+        out.append((omega, -p.real / omega, a / omega**2, b / omega**2))
+    return out
+
+
+_RIPPLE, _ORDER = math.sqrt(10.0**0.05 - 1.0), 4
+_SINH, _COSH = math.sinh(math.asinh(1.0 / _RIPPLE) / _ORDER), math.cosh(math.asinh(1.0 / _RIPPLE) / _ORDER)
+_ANGLES = [math.pi * (2 * k + 1) / (2 * _ORDER) for k in range(_ORDER // 2)]
+(_W1, _Z1, _A1, _B1), (_W2, _Z2, _A2, _B2) = _modes(
+    [complex(-_SINH * math.sin(angle), _COSH * math.cos(angle)) for angle in _ANGLES]
+)
+
+
+@block
+def chebyshev(dt: float, u: float, state: State, p: State) -> float:
+    """Four poles after Chebyshev; p = (time_constant,)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_Y2] = u
+        state[_V] = 0.0
+        state[_V2] = 0.0
+        state[_LAST] = u
+        return u
+    y, v = low_pass(dt, state[_Y], state[_V], state[_LAST], u, _W1 / p[0], _Z1)
+    y2, v2 = low_pass(dt, state[_Y2], state[_V2], state[_LAST], u, _W2 / p[0], _Z2)
+    state[_Y] = y
+    state[_V] = v
+    state[_Y2] = y2
+    state[_V2] = v2
+    state[_LAST] = u
+    return _A1 * y + _A2 * y2 + p[0] * (_B1 * v + _B2 * v2)
 
 
 # moving average: the integral of the force at knots in a ring; (age of the newest, integral, force, time) …
@@ -173,6 +257,17 @@ EFFECT = Effect(
             state=(0.0,) * 3,
         ),
         Form(
+            name="partly",
+            what="one pole for a share of the force, the rest at once",
+            parameters=(
+                _TIME_CONSTANT,
+                Parameter("share", "1", 0.1, 1.0, 0.7, "share of the force that comes late", starts=(0.4, 0.7)),
+            ),
+            sought=False,
+            blocks={"sensor": partly},
+            state=(0.0,) * 3,
+        ),
+        Form(
             name="two_poles",
             what="two equal poles, critically damped",
             parameters=(_TIME_CONSTANT,),
@@ -185,6 +280,22 @@ EFFECT = Effect(
             parameters=(_TIME_CONSTANT,),
             blocks={"sensor": butterworth},
             state=(0.0,) * 4,
+        ),
+        Form(
+            name="three_poles",
+            what="third order, as flat as can be",
+            parameters=(_TIME_CONSTANT,),
+            sought=False,
+            blocks={"sensor": three_poles},
+            state=(0.0,) * 6,
+        ),
+        Form(
+            name="chebyshev",
+            what="four poles, nearly a delay",
+            parameters=(_TIME_CONSTANT,),
+            sought=False,
+            blocks={"sensor": chebyshev},
+            state=(0.0,) * 6,
         ),
         Form(
             name="moving_average",

@@ -48,7 +48,12 @@ CONTRACT = {
 }
 """The table of the file formats: id, and the parameters that a file must give."""
 
-WITHOUT_AMPLITUDE = {"resonance": {"low_pass"}, "saturation": None, "separation": None, "elastic_law": None}
+WITHOUT_AMPLITUDE = {
+    "resonance": {"low_pass", "transmitted", "amplifier", "pair", "antiresonance", "loaded"},
+    "saturation": None,
+    "separation": None,
+    "elastic_law": None,
+}
 """Forms that no number switches off (None: all of the effect)."""
 
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from scipy.signal import cheb1ap
 
-from sim.effects import Active
+from sim.effects import Active, effect
 from sim.effects.draws import uniform
 from sim.pad import Cascade
 from tests.sim.effect_tools import AIR, LINEAR, SOFT, K, active, simulate
@@ -28,6 +29,7 @@ def sample(effect: Active, force: Array) -> Array:
     return np.array([plant.sample(1e-3, float(f)) for f in force])
 
 
+LAGS = [form.name for form in effect("sensor_lag").forms]
 EVEN = np.arange(3000) * 1e-3
 UNEVEN = np.cumsum(np.random.default_rng(3).uniform(0.0, 4e-3, 3000))
 
@@ -68,7 +70,7 @@ class TestClockSkew:
 
 
 class TestSensorLag:
-    @pytest.mark.parametrize("form", ["first_order", "two_poles", "butterworth", "moving_average", "decimator"])
+    @pytest.mark.parametrize("form", LAGS)
     @pytest.mark.parametrize("t", [EVEN, UNEVEN], ids=["even", "uneven"])
     def test_behind_a_ramp_by_the_time_constant(self, form: str, t: Array) -> None:
         tau = 0.03
@@ -81,9 +83,28 @@ class TestSensorLag:
         h = tau / 2
         second = s - 2 * h + (2 * h + s) * np.exp(-s / h)
         mean = np.where(s < 2 * tau, s**2 / (4 * tau), s - tau)
-        for form, expected in (("first_order", first), ("two_poles", second), ("moving_average", mean)):
+        part = s - tau * (1 - np.exp(-0.7 * s / tau))
+        expectations = {"first_order": first, "two_poles": second, "moving_average": mean, "partly": part}
+        for form, expected in expectations.items():
             out = sense(active("sensor_lag", form, time_constant=tau), UNEVEN, s)
             assert_allclose(out, expected, atol=1e-12)
+
+    def test_chebyshev_ripples_by_half_a_decibel_and_then_falls(self) -> None:
+        """|H|² = 1/(1 + ε² T₄²(ω/ω_c)): 1 at the crests of the ripple; delay and band edge go with each other."""
+        t, tau = np.arange(60000) * 1e-4, 0.01
+        poles = cheb1ap(4, 0.5)[1]
+        edge = float(np.sum(-1 / poles).real) / tau
+        for ratio in (0.3, math.cos(math.pi / 4), 1.0, 1.5):
+            out = sense(active("sensor_lag", "chebyshev", time_constant=tau), t, np.sin(ratio * edge * t))
+            chebyshev = 8 * ratio**4 - 8 * ratio**2 + 1
+            level = math.sqrt(1 + (10**0.05 - 1)) / math.sqrt(1 + (10**0.05 - 1) * chebyshev**2)
+            assert_allclose(np.abs(out[t > 3]).max(), level, rtol=1e-3)
+
+    def test_three_poles_pass_sines_as_butterworths_do(self) -> None:
+        t, tau = np.arange(60000) * 1e-4, 0.01
+        for ratio in (0.3, 1.0, 1.5):
+            out = sense(active("sensor_lag", "three_poles", time_constant=tau), t, np.sin(ratio * 2 / tau * t))
+            assert_allclose(np.abs(out[t > 3]).max(), 1 / math.sqrt(1 + ratio**6), rtol=1e-3)
 
     def test_butterworth_overshoots_a_step_by_four_percent(self) -> None:
         force = np.where(EVEN > 0.1, 1.0, 0.0)
@@ -119,7 +140,7 @@ class TestSensorLag:
         assert np.abs(out - three)[1000:].max() < 1e-3 < 0.02 < np.abs(late - three)[1000:].max()
 
     def test_the_first_sample_is_rest(self) -> None:
-        for form in ("first_order", "two_poles", "butterworth", "moving_average", "decimator"):
+        for form in LAGS:
             assert_allclose(sense(active("sensor_lag", form), EVEN[:50], np.full(50, 4.0)), 4.0)
 
 
@@ -163,6 +184,49 @@ class TestResonance:
         part = sense(active("resonance", "partial", share=0.25, **numbers), EVEN, force)
         assert_allclose(part, 0.75 * force + 0.25 * whole, atol=1e-13)
 
+    def test_transmissibility_and_a_pole_after_the_mode(self) -> None:
+        """Gain and phase of sines, against the transfer functions."""
+        t = np.arange(40000) * 2e-4
+        w, z, r = 2 * math.pi * 20.0, 0.2, 3.0
+        late = t > 4
+        for ratio in (0.5, 1.0, 2.0):
+            s = 1j * ratio
+            mode = s * s + 2 * z * s + 1
+            other, zeros = s * s + 2 * z * s * r + r * r, (s / r) ** 2 + 2 * z * s / r + 1
+            transfers = {
+                "transmitted": (2 * z * s + 1) / mode,
+                "amplifier": 1 / mode / (1 + s / r),
+                "pair": 0.7 / mode + 0.3 * r * r / other,
+                "antiresonance": zeros / mode,
+            }
+            for form, transfer in transfers.items():
+                given = {} if form == "transmitted" else {"ratio": r}
+                given |= {"share": 0.7} if form == "pair" else {}
+                effect_ = active("resonance", form, frequency=20.0, damping_ratio=z, **given)
+                out = sense(effect_, t, np.sin(ratio * w * t))
+                expected = np.imag(transfer * np.exp(1j * ratio * w * t))
+                assert_allclose(out[late], expected[late], atol=3e-4)
+
+    def test_a_mode_that_is_stiffer_under_load(self) -> None:
+        """Small steps beside a load that stays: they ring at √(1 + growth (F/at − 1)) of the frequency."""
+        t = np.arange(20000) * 1e-4
+        for load in (0.0, 4.0, 8.0):
+            numbers = {"frequency": 20.0, "damping_ratio": 0.05, "growth": 0.36, "at_force": 4.0}
+            rings = sense(active("resonance", "loaded", **numbers), t, np.where(t > 0.1, load + 1e-3, load)) - load
+            faster = math.sqrt(1 + 0.36 * (load / 4.0 - 1))
+            plain = active("resonance", frequency=20.0 * faster, damping_ratio=0.05 / faster)
+            assert_allclose(rings, sense(plain, t, np.where(t > 0.1, 1e-3, 0.0)), atol=1e-6)
+
+    def test_other_shapes_are_exact_at_any_spacing(self) -> None:
+        """What comes out of ramps between uneven samples does not change when more samples lie on them."""
+        t = UNEVEN[:300]
+        force = np.cumsum(np.random.default_rng(5).standard_normal(t.size))
+        fine = np.sort(np.concatenate([t, (t[1:] + t[:-1]) / 2]))
+        for form in ("transmitted", "amplifier", "pair", "antiresonance"):
+            ringing = active("resonance", form, frequency=20.0, damping_ratio=0.1)
+            whole = sense(ringing, fine, np.interp(fine, t, force))
+            assert_allclose(sense(ringing, t, force), whole[np.searchsorted(fine, t)], atol=1e-9)
+
 
 class TestBiasDriftHum:
     def test_bias(self) -> None:
@@ -175,7 +239,12 @@ class TestBiasDriftHum:
         slips = sense(active("force_bias", "slipping", bias=-0.2, share=0.1, moved_at=5.0, within=0.1), t, np.zeros(4))
         assert_allclose(slips, [-0.19, -0.2, -0.21, -0.21])
 
-    @pytest.mark.parametrize("form", ["linear", "settling", "root", "logarithmic", "turning"])
+    def test_a_bias_that_pulls_along_the_way(self) -> None:
+        t, x = np.arange(6.0), np.array([-9.0, -1.0, 0.0, 1.0, 2.0, 9.0])
+        pulls = simulate(AIR, [active("force_bias", "along", bias=-0.2, share=0.1, reach=2.0)], t, x)
+        assert_allclose(pulls, -0.2 * np.array([0.9, 0.9, 0.95, 1.0, 1.05, 1.1]))
+
+    @pytest.mark.parametrize("form", [form.name for form in effect("force_drift").forms])
     def test_all_drifts_begin_at_the_rate(self, form: str) -> None:
         t = np.array([5.0, 5.001])
         assert_allclose(sense(active("force_drift", form, rate=-0.3), t, np.zeros(2)), [0.0, -0.3e-3], rtol=1e-4)
@@ -188,6 +257,12 @@ class TestBiasDriftHum:
         assert_allclose(sense(active("force_drift", "settling", **numbers), t, zero)[1:], 0.2)
         turns = sense(active("force_drift", "turning", **numbers), np.array([0.0, 20.0, 40.0]), zero)
         assert_allclose(turns, [0.0, 0.4 / math.pi, 0.0], atol=1e-12)
+        slows = sense(active("force_drift", "hyperbolic", **numbers), np.array([0.0, 20.0, 60.0]), zero)
+        assert_allclose(slows, [0.0, 0.1, 0.15], atol=1e-12)
+        bends = active("force_drift", "bent", rate=0.01, share=0.25, moved_at=20.0)
+        assert_allclose(sense(bends, np.array([0.0, 20.0, 40.0]), zero), [0.0, 0.2, 0.25], atol=1e-12)
+        ends = sense(active("force_drift", "quickening", **numbers), np.array([0.0, 20.0, 40.0]), zero)
+        assert_allclose(ends, [0.0, 0.3, 0.8], atol=1e-12)
         root = sense(active("force_drift", "root", **numbers), t, zero)
         assert_allclose(root[2] / root[1], 2.0, rtol=0.05)
         log = sense(active("force_drift", "logarithmic", **numbers), t, zero)
@@ -202,6 +277,27 @@ class TestBiasDriftHum:
         spectrum = np.abs(np.fft.rfft(both)) / 2000
         assert_allclose(spectrum[[200, 400, 600]], [0.1, 0.0, 0.03], atol=1e-9)
 
+    def test_hum_with_more_harmonics_and_hum_that_swings(self) -> None:
+        t = np.arange(4000) * 1e-3
+        given = {"ratio": 0.3, "fifth": 0.2, "fifth_phase": 1.0, "seventh": 0.1}
+        flat = sense(active("mains_hum", "flat_topped", amplitude=0.1, **given), t, np.zeros(t.size))
+        spectrum = np.abs(np.fft.rfft(flat)) / 2000
+        assert_allclose(spectrum[[200, 600, 1000, 1400]], [0.1, 0.03, 0.02, 0.01], atol=1e-9)
+        swing = {"period": 4.0, "swell": 0.4, "swell_phase": 0.3, "wander": 0.5, "wander_phase": 1.0}
+        out = sense(active("mains_hum", "swinging", amplitude=0.1, frequency=50.0, **swing), t, np.zeros(t.size))
+        slow = 2 * math.pi * t / 4.0
+        angle = 2 * math.pi * 50 * t + 0.5 * np.sin(slow + 1.0)
+        assert_allclose(out, 0.1 * (1 + 0.4 * np.sin(slow + 0.3)) * np.sin(angle), atol=1e-9)
+
+    def test_hum_that_grows_with_the_load(self) -> None:
+        t = np.arange(4000) * 1e-3
+        numbers = {"amplitude": 0.1, "growth": 0.25, "at_force": 2.0}
+        for form, third in (("loaded", 0.0), ("loaded_harmonics", 0.03)):
+            for load, swells in ((0.0, 0.5), (2.0, 1.0), (6.0, 2.0)):
+                out = sense(active("mains_hum", form, frequency=50.0, **numbers), t, np.full(t.size, load)) - load
+                spectrum = np.abs(np.fft.rfft(out)) / 2000
+                assert_allclose(spectrum[[200, 400, 600]], [0.1 * swells, 0.0, third * swells], atol=1e-9)
+
 
 class TestLimitsAndFaults:
     force = np.linspace(-10.0, 10.0, 401)
@@ -209,6 +305,8 @@ class TestLimitsAndFaults:
     def test_saturation(self) -> None:
         assert_allclose(sample(active("saturation", limit=4.0), self.force), np.clip(self.force, -4, 4))
         assert_allclose(sample(active("saturation", "upper", limit=4.0), self.force), np.minimum(self.force, 4))
+        stopped = sample(active("saturation", "stop", limit=4.0, passes=0.05), self.force)
+        assert_allclose(stopped, np.minimum(self.force, 4) + 0.05 * np.maximum(self.force - 4, 0), atol=1e-12)
         soft = sample(active("saturation", "soft", limit=4.0, sharpness=3.0), self.force)
         assert np.all(np.diff(soft) > 0)
         assert np.abs(soft).max() < 4.0

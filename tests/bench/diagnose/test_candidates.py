@@ -77,3 +77,11 @@ def test_a_joint_opens_or_closes_within_the_forces_that_were_met(force_N):
             p for p in narrowed(effect("frame_compliance").form(form), reach).parameters if p.name == "preload"
         )
         assert 0 < preload.lower < min(preload.starts) < max(preload.starts) < preload.upper <= force_N
+
+
+@pytest.mark.parametrize("travel_mm", [0.3, 3.0])
+def test_a_pull_reaches_no_further_than_the_way_on_which_it_is_seen(travel_mm):
+    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=travel_mm, depth_mm=0.8 * travel_mm, force_N=5.0)
+    for form in effect("adhesion").forms:
+        pull = next(p for p in narrowed(form, reach).parameters if p.name == "range")
+        assert max(pull.starts) <= pull.upper <= travel_mm

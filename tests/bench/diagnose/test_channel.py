@@ -8,8 +8,15 @@ from scipy.signal import lfilter
 
 from bench.diagnose import hum, swing
 from bench.diagnose.channel import faults
-from bench.diagnose.channel_causes import joined
+from bench.diagnose.channel_causes import beyond_limit, joined
+from bench.diagnose.data import Data
+from bench.diagnose.numbers import PadNumbers, Structure, cause_of
+from bench.diagnose.refit import Fit
 from bench.diagnose.result import CauseFound
+from sim.effects import effect
+from sim.elastic import Exponential
+from sim.pad import Pad
+from sim.relaxation import Relaxation
 from tests.truth.cases import draw_case
 
 SAMPLE_s = 0.002
@@ -139,6 +146,32 @@ def test_the_tail_of_heavy_noise_is_no_fault():
     assert flagged <= 1
 
 
+def test_what_is_left_below_a_ceiling_is_not_the_lower_half_of_its_noise():
+    """Holds close below a ceiling: which samples count must not go by their own noise."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        levels = np.repeat(np.linspace(5.4, 5.9, 11), 400)
+        noise = 0.02 * rng.standard_normal(len(levels) + 200)
+        force = np.minimum(np.concatenate([np.full(200, 8.0), levels]) + noise, 6.0)
+        found = faults(force)
+        assert found.saturated[:200].all() and not found.saturated[200:].any() and found.bent.any()
+        for k in range(200, len(force), 400):
+            left = noise[k : k + 400][found.good[k : k + 400]]
+            assert abs(left.mean() if len(left) else 0.0) < 4.0 * 0.02 / np.sqrt(max(len(left), 1))
+
+
+def test_samples_beyond_a_limit_that_was_fitted_are_told():
+    time, depth = np.arange(500) * 0.01, np.linspace(0.0, 2.0, 500)
+    pad = PadNumbers(Pad(Exponential(3.0, 0.0), Relaxation(), unilateral=True), 2.0, 6.0)
+    data = Data(time, depth, 3.0 * depth, np.ones(500), np.full(500, 0.01), np.zeros(500, dtype=np.intp))
+    for form in ("hard", "upper", "stop"):
+        limit = cause_of(effect("saturation"), effect("saturation").form(form), {"limit": 4.5})
+        structure = Structure(pad, (limit,))
+        fit = Fit(structure, structure.x(pad.x()), 0.0, np.eye(3), True)
+        assert np.array_equal(beyond_limit(data, fit), 3.0 * depth > 4.5)
+        assert not beyond_limit(data, Fit(Structure(pad), pad.x(), 0.0, np.eye(2), True)).any()
+
+
 @pytest.mark.parametrize(("frequency_Hz", "sample_s", "mains"), [
     (50.0, 0.001, True), (60.02, 0.001, True), (100.0, 0.002, True), (150.0, 0.001, True),
     (8.0, 0.001, False), (23.0, 0.001, False), (75.0, 0.001, False),
@@ -147,6 +180,61 @@ def test_the_tail_of_heavy_noise_is_no_fault():
 def test_a_line_is_of_the_mains_by_its_frequency_alone(frequency_Hz, sample_s, mains):
     line = hum.Line(frequency_Hz, 0.01, 0.0, 0.0, 0.0, sample_s)
     assert line.of_the_mains is mains
+
+
+def _holds(stamp_s: np.ndarray, error_N: np.ndarray, length: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Parts as of holds of so many samples with nothing between them, and no curve taken out."""
+    cuts = range(0, len(stamp_s) - length + 1, length)
+    return [(stamp_s[k : k + length], error_N[k : k + length], np.zeros((length, 0))) for k in cuts]
+
+
+@pytest.mark.parametrize(("frequency_Hz", "rate_Hz", "jitter"), [
+    (60.0, 114.0, 0.02), (60.0, 114.0, 0.0), (49.98, 103.0, 0.0), (60.0, 100.0, 0.02), (50.03, 1000.0, 0.1),
+    (100.0, 130.0, 0.02),
+])  # fmt: skip
+def test_a_line_is_found_at_the_mains_own_frequency_however_it_is_folded(frequency_Hz, rate_Hz, jitter):
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        t = (np.arange(4000) + jitter * rng.standard_normal(4000)) / rate_Hz
+        t -= t[0]
+        e = 0.02 * np.sin(2 * np.pi * frequency_Hz * t + 0.3) + 0.01 * rng.standard_normal(len(t))
+        line = hum.find(0.0, _holds(t, e, 500), t, e)
+        assert line is not None
+        assert line.frequency_Hz == pytest.approx(frequency_Hz, abs=0.01)
+        assert line.amplitude_N == pytest.approx(0.02, rel=0.05)
+        assert line.growth_1_N == 0.0
+
+
+def test_a_line_that_grows_with_the_load_is_stated_at_the_mean_force():
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        t = np.arange(8000) / 500.0
+        load = np.repeat([0.0, 2.0, 4.0, 10.0], 2000)
+        e = 0.02 * (0.7 + 0.1 * load) * np.sin(2 * np.pi * 50.0 * t) + 0.01 * rng.standard_normal(len(t))
+        line = hum.find(0.0, _holds(t, e, 1000), t, load + e)
+        assert line is not None
+        assert line.amplitude_N == pytest.approx(0.02 * 1.1, rel=0.05)
+        assert line.growth_1_N * line.amplitude_N == pytest.approx(0.002, rel=0.15)
+        assert np.std(e - line.force_N(t, load)) == pytest.approx(0.01, rel=0.03)
+
+
+@pytest.mark.parametrize("shape", ["sine", "odd harmonics", "swells", "wanders"])
+def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        t = np.arange(36_500) / 730.0
+        slow = np.sin(2 * np.pi * t / 23.0 + 0.4)
+        swells = 1.0 + (0.3 * slow if shape == "swells" else 0.0)
+        angle = 2 * np.pi * 50.0 * t + (0.4 * slow if shape == "wanders" else 0.0)
+        tops = np.sin(3 * angle) / 5 - np.sin(5 * angle + 0.2) / 10 if shape == "odd harmonics" else 0.0
+        clean = 0.03 * (swells * np.sin(angle + 0.5) + tops)
+        e = clean + 0.01 * rng.standard_normal(len(t))
+        line = hum.find(0.0, _holds(t, e, 4500), t, e)
+        assert line is not None
+        assert bool(line.swing) == (shape in ("swells", "wanders"))
+        assert [order for order, _, _ in line.higher] == ([5] if shape == "odd harmonics" else [])
+        assert line.growth_1_N == 0.0
+        assert np.std(line.force_N(t, np.zeros(len(t))) - clean) < 1.5e-3
 
 
 def test_what_sways_at_a_frequency_of_its_own_is_seen_and_noise_is_not():

@@ -12,7 +12,7 @@ from bench.diagnose.data import Prepared, prepare
 from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.refit import Fit, onto, refit
-from bench.diagnose.shapes import reshaped
+from bench.diagnose.shapes import departed, reshaped
 from bench.diagnose.spread import covariance, of_the_noise
 from sim.effects import effect
 from sim.model import Model
@@ -74,3 +74,13 @@ def test_shapes_that_serve_as_well_widen_what_is_stated() -> None:
     value, error = stated(narrow, "rate")
     assert abs(value - true) > 2 * abs(error)  # the straight line has the mean rate and not the first
     assert abs(value - true) < 2 * abs(stated(wide, "rate")[1])
+
+
+def test_a_shape_as_far_from_its_family_as_can_be_is_another_causes() -> None:
+    """A bias of which this much goes with the position is a spring; one of which nothing does is a bias."""
+    _, _, fit = fitted("force_bias", "constant", "along")
+    share = fit.structure.of_cause(0).start + 1
+    for value, far in ((0.0, False), (0.2, False), (0.3, True), (-0.3, True)):
+        x = fit.x.copy()
+        x[share] = fit.structure.coordinates[share].x(value)
+        assert departed(replace(fit, x=x), 0) is far
