@@ -4,8 +4,8 @@ Over the time T since the first force sample the force clock counts T (1 + skew 
 
 - `linear`: the clocks agree at the first force sample.
 - `offset`: there they differ by `offset` already (force clock ahead). Without a skew it is a delay.
-- `ageing`: the skew grows or fades evenly, as of a quartz that warms up: skew · (1 + growth (t − at_time)). `at_time` is
-  a choice and not fitted: the middle of the data, so that `skew` is its mean over them.
+- `ageing`: the skew grows or fades evenly, as of a quartz that warms up: skew · (1 + growth (t − at_time)). `at_time`
+  is a choice and not fitted: the middle of the data, so that `skew` is its mean over them.
 
 A single stamp without an array around it (a simulated device that is read out) counts from time 0.
 
