@@ -17,6 +17,9 @@ since the last reversal, rises with it, and is a continuous function of position
   the probe stands in the pad (F. P. Bowden, D. Tabor, The Friction and Lubrication of Solids, Oxford, 1950).
 - `maxwell_slip`: five of Prandtl's elements side by side, their distances spread geometrically: the build-up is gradual
   and remembers inner loops (W. D. Iwan, J. Appl. Mech. 33, 1966, 893–900).
+- `worked_in`: Prandtl's element whose slider holds F_c (1 + stiffness s): grease that has lain is stiffer, gets worked
+  in along the way, and comes back at rest: s' = (1 − s)/rest − s |v|/way, whole at first (P. M. Lugt, Grease
+  Lubrication in Rolling Bearings, Wiley, 2013). `coulomb` is what is left when it is worked in.
 
 State: last position, force, whether there was a position yet. A first position is rest without friction force.
 """
@@ -29,6 +32,7 @@ from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
 _LAST, _FORCE, _STARTED, _DEPTH = range(4)
+_GREASE = 3
 _FIRST, _ELEMENTS = 3, 5
 
 
@@ -107,6 +111,25 @@ def load_dependent(dt: float, y: float, state: State, p: State) -> float:
     limit = p[0] * (1.0 + p[1] * state[_DEPTH])
     force = state[_FORCE] + moved * (limit / p[2])
     force = max(-limit, min(limit, force))
+    state[_FORCE] = force
+    return force
+
+
+@block
+def worked_in(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element behind grease; p = (coulomb, stiffness, way, rest, presliding); state: the grease's too."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_LAST] = y
+        state[_GREASE] = 1.0
+    moved = y - state[_LAST]
+    state[_LAST] = y
+    back, gone = dt / p[3], abs(moved) / p[2]
+    if back + gone > 0.0:  # exact where speed is constant
+        settled = back / (back + gone)
+        state[_GREASE] = settled + (state[_GREASE] - settled) * math.exp(-back - gone)
+    limit = p[0] * (1.0 + p[1] * state[_GREASE])
+    force = max(-limit, min(limit, state[_FORCE] + moved * (limit / p[4])))
     state[_FORCE] = force
     return force
 
@@ -221,6 +244,20 @@ EFFECT = Effect(
                 _PRESLIDING,
             ),
             blocks={"depth": note_depth, "probe": load_dependent},
+            state=(0.0, 0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="worked_in",
+            what="more at first, until the grease is worked in",
+            parameters=(
+                _COULOMB,
+                Parameter("stiffness", "1", 0.0, 5.0, 0.5, "what fresh grease adds, over `coulomb`", starts=(0.5,)),
+                Parameter("way", "mm", 0.1, 1e3, 10.0, "distance in which it is worked in", starts=(3.0, 15.0)),
+                Parameter("rest", "s", 0.1, 1e4, 30.0, "time in which it comes back", starts=(10.0, 100.0)),
+                _PRESLIDING,
+            ),
+            sought=False,
+            blocks={"probe": worked_in},
             state=(0.0, 0.0, 0.0, 0.0),
         ),
     ),
