@@ -239,6 +239,12 @@ class TestBacklash:
         assert_allclose(closing[: round(first / 1e-3)], 0.0, atol=1e-9)
         assert_allclose(np.unique(np.round(closing, 9)), [0.0, 0.25, 0.5, 0.75, 1.0])
 
+    def test_a_play_that_runs_out_is_as_wide_as_its_place_says(self) -> None:
+        x, probe, _ = self.loop("running_out", gap=0.1, swell=0.3, turn=0.7, angle=0.5)
+        gap = 0.1 * (1 + 0.3 * np.sin(2 * np.pi * x / 0.7 + 0.5))
+        back = slice(1150, 2001)
+        assert_allclose(probe[back] - x[back], gap[back], atol=1e-12)
+
     def test_a_loaded_joint_seats_within_the_closing_force(self) -> None:
         _, probe = Cascade(LINEAR, [active("backlash", "loaded", gap=0.05, closing_force=0.1)]).probe([0, 1], [0, 3.0])
         assert_allclose(probe, [0.0, 3.0 - 0.05], atol=1e-12)
