@@ -100,7 +100,7 @@ def planned_moves(
             groups = [g for g in groups if not any(g[0] < o[1] and o[0] < g[1] for o in out)]
             if groups:
                 found = _trapezoids(
-                    time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, ALL, resting, 2.0 * noise_mm
+                    time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, ALL, resting, 4.0 * noise_mm
                 )
                 told = _told(found, time_s, position_mm, noise_mm)
                 out |= {k: v for k, v in told.items() if not any(k[0] < o[1] and o[0] < k[1] for o in out)}
