@@ -119,6 +119,26 @@ class TestFriction:
             grease = 1 - (1 - grease) * math.exp(-20.0 / 30.0)
             assert_allclose(plant.step(1e-9, 6.01), 0.1 * (1 + 0.5 * grease), rtol=0.01)
 
+    def test_friction_that_is_another_at_each_place(self) -> None:
+        terms = {"sine_1": 0.2, "cosine_1": -0.1, "sine_2": 0.1, "cosine_2": 0.15}
+        plant = Cascade(AIR, [active("friction", "uneven", coulomb=0.1, reach=2.0, presliding=1e-3, **terms)]).plant()
+        plant.step(0.0, 0.0)
+        x = np.linspace(0.0, 2.0, 401)[1:]
+        forth = np.array([plant.step(1e-3, p) for p in x])
+        back = np.array([plant.step(1e-3, p) for p in x[-2::-1]])
+        assert_allclose(forth[:-1], -back[::-1], atol=1e-12)
+        assert_allclose(forth.mean(), 0.1, rtol=1e-9)
+        angle = np.pi * x
+        level = 0.2 * np.sin(angle) - 0.1 * np.cos(angle) + 0.1 * np.sin(2 * angle) + 0.15 * np.cos(2 * angle)
+        assert_allclose(forth, 0.1 * (1 + level), atol=1e-12)
+
+    def test_friction_of_polymers_goes_with_the_logarithm_of_speed(self) -> None:
+        for speed, factor in ((1.0, 1.0), (1.1 * math.e - 0.1, 1.05), (0.0, 1 + 0.05 * math.log(0.1 / 1.1))):
+            plant = Cascade(AIR, [active("friction", "logarithmic", coulomb=0.1, growth=0.05, presliding=1e-3)]).plant()
+            plant.step(0.0, 0.0)
+            plant.step(1.0, 5.0)
+            assert_allclose(plant.step(0.5, 5.0 + 0.5 * speed), 0.1 * factor, rtol=1e-12)
+
     def test_load_dependent_friction_grows_with_depth(self) -> None:
         x = ramp(2.0, 2001)
         grows = active("friction", "load_dependent", coulomb=0.05, load=0.5)
