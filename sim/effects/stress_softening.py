@@ -3,6 +3,8 @@
 The factor on F^e depends on depth δ and on the deepest depth so far; loading beyond it follows the virgin curve.
 
 - `exponential`: 1 − share (1 − e^(−(deepest − δ)/depth)).
+- `virgin`: (1 − D(deepest))/(1 − D(δ)) with that damage D(δ) = share (1 − e^(−δ/depth)): the law is the curve of the
+  pad as it is loaded first, D in it.
 - `ratio`: (δ/deepest)^a, with an exponent a by which the share is gone at twice `depth` below `reach` (Z. Q. Guo, L. J.
   Sluys, Computational modelling of the stress-softening phenomenon of rubber-like materials under cyclic loading, Eur.
   J. Mech. A 25, 2006, 877–896). One number: `depth` only says where the share is stated.
@@ -64,6 +66,14 @@ def ratio(dt: float, depth: float, state: State, p: State) -> float:
     here = max(depth, 0.0)
     state[0] = max(state[0], here, p[1])
     return (here / state[0]) ** p[0] if state[0] > 0.0 else 1.0
+
+
+@block
+def virgin(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (share, depth, already)."""
+    here = max(depth, 0.0)
+    state[0] = max(state[0], here, p[2])
+    return (1.0 + p[0] * math.expm1(-state[0] / p[1])) / (1.0 + p[0] * math.expm1(-here / p[1]))
 
 
 def _exponent(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -137,6 +147,13 @@ EFFECT = Effect(
             what="softer at all depths, by the deepest point",
             parameters=(_SHARE, _DEPTH, _ALREADY),
             blocks={"elastic": discontinuous_damage},
+            state=(0.0,),
+        ),
+        Form(
+            name="virgin",
+            what="damage by the deepest point, which is in the first loading already",
+            parameters=(_SHARE, _DEPTH, _ALREADY),
+            blocks={"elastic": virgin},
             state=(0.0,),
         ),
         Form(

@@ -139,7 +139,9 @@ UP_1, DOWN_1, UP_2, DOWN_2, UP_3 = (
 
 
 class TestStressSoftening:
-    @pytest.mark.parametrize("form", ["exponential", "linear", "ogden_roxburgh", "discontinuous_damage", "ratio"])
+    @pytest.mark.parametrize(
+        "form", ["exponential", "linear", "ogden_roxburgh", "discontinuous_damage", "ratio", "virgin"]
+    )
     def test_softer_below_the_deepest_and_the_same_at_every_return(self, form: str) -> None:
         force = simulate(LINEAR, [active("stress_softening", form, share=0.3, depth=0.4)], TIME, CYCLES)
         inside = slice(20, 480)
@@ -162,6 +164,8 @@ class TestStressSoftening:
             "ogden_roxburgh": 1 - share * np.vectorize(math.erf)((1 - x**2) / (1 - (1 - depth) ** 2)),
             "discontinuous_damage": np.full(x.size, 1 - share * (1 - math.exp(-1.0 / depth))),
         }
+        damage = share * -np.expm1(-x / depth)
+        factors["virgin"] = (1 - damage[-1]) / (1 - damage)
         # by a power of x over 1 mm that has taken the share at 2 depth below that
         factors["ratio"] = x ** (math.log(1 - share) / math.log(1 - 2 * depth))
         for form, factor in factors.items():
@@ -412,6 +416,22 @@ class TestSeparationAndAdhesion:
         pull = np.interp(gap, [0.0, 0.05, 0.2], [0.0, 0.3, 0.0])
         assert_allclose(force[:1000], 0.0, atol=1e-12)
         assert_allclose(force[2000:], K * np.maximum(x[2000:], 0.0) - pull, atol=1e-9)
+
+    def test_fibrils_hold_until_they_tear(self) -> None:
+        x = np.concatenate([ramp(0.5, 101), -ramp(0.3, 301)])
+        numbers = {"pull_off": 0.3, "range": 0.2, "crest": 0.2, "holds": 0.5}
+        force = simulate(LINEAR, [active("adhesion", "drawing", **numbers)], np.arange(x.size) * 1e-2, x)
+        gap = 0.3 * np.arange(301) / 300
+        wanted = 0.3 * np.interp(gap / 0.2, [0.0, 0.2, 0.6, 1.0], [0.0, 1.0, 1.0, 0.0])
+        assert_allclose(force[201:502], -wanted, atol=1e-9)
+        assert_allclose(force[502:702], 0.0, atol=1e-12)  # no bond on the way in
+
+    def test_a_neck_bears_more_the_quicker_it_is_opened(self) -> None:
+        x = np.concatenate([ramp(0.5, 101), -ramp(0.1, 101, False)])
+        for speed, factor in ((10.0, 1.0), (0.1, (0.2 / 10.1) ** 0.15)):
+            numbers = {"pull_off": 0.3, "range": 0.2, "exponent": 0.15}
+            force = simulate(LINEAR, [active("adhesion", "quick", **numbers)], np.arange(x.size) * 1e-3 / speed, x)
+            assert_allclose(force[-1], -0.3 * factor * math.sin(0.25 * math.pi), rtol=1e-9)
 
     def test_a_neck_that_snaps(self) -> None:
         x = ramp(2.0, 2001) - 1.0005
