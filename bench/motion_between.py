@@ -24,13 +24,15 @@ Array = NDArray[np.float64]
 STEP = 1 / 100  # of the reach: a longer way between two nodes is cut
 BEND = 1e-4  # of the reach: a bend that a line between nodes may leave out
 WIDEST = 64  # nodes an interval at the most
-INSIDE = 16  # samples of a move that are looked at
+INSIDE, ALL = 16, 200  # samples of a move that are looked at; where they are noisy
 SCAN = np.geomspace(100.0, 1e6, 25)  # of accelerations, in reaches/s²
 GENTLE = 0.01  # what a doubled acceleration costs, in squares of the slack and a move
 SLACK = 1e-3  # of the way: what a trapezoid may miss a sample by
 LEAST = 3  # samples of a move that can show it to be a trapezoid
 NEAR = 30  # samples between a move and a rest, whose first and last ones may be told late
 PAUSE = 2  # intervals that are no rest where the motion hardly slows down
+HIDDEN = 0.9  # of its time: as much of a move may be seen when its ends are lost in the noise
+GAPS = (30, 10, PAUSE)  # samples that noise can make look like a rest amid a slow move
 AGREED = 5.0  # standard deviations of χ² within which it is one
 
 
@@ -92,12 +94,39 @@ def planned_moves(
     out: Moves = {}
     for quiet_mm in (left_mm, noise_mm):  # what is left beside a move may hide that it begins at rest
         moving = _carried_on(_moving(clean_mm, reach, quiet_mm)[0], clean_mm)
-        groups = [(a, b) for a, b in _grouped(moving, moving) if b - a >= LEAST]
-        if groups:
-            found = _trapezoids(time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, resting=resting)
-            told = _told(found, time_s, position_mm, noise_mm)
-            out |= {k: v for k, v in told.items() if not any(k[0] < o[1] and o[0] < k[1] for o in out)}
+        pieces = [_onward(clean_mm, *group) for group in _grouped(moving, moving)]
+        for gap in GAPS:
+            groups = [(a, b) for a, b in _chained(clean_mm, pieces, gap) if b - a >= LEAST]
+            groups = [g for g in groups if not any(g[0] < o[1] and o[0] < g[1] for o in out)]
+            if groups:
+                found = _trapezoids(
+                    time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, ALL, resting, 4.0 * noise_mm
+                )
+                told = _told(found, time_s, position_mm, noise_mm)
+                out |= {k: v for k, v in told.items() if not any(k[0] < o[1] and o[0] < k[1] for o in out)}
     return _apart(out)
+
+
+def _onward(position_mm: Array, first: int, last: int) -> tuple[int, int]:
+    """The stretch without steps at its ends that go against its way: they are noise of the rests beside it."""
+    on = np.flatnonzero(np.diff(position_mm[first : last + 1]) * (position_mm[last] - position_mm[first]) > 0.0)
+    return (first + int(on[0]), first + int(on[-1]) + 1) if len(on) else (first, first)
+
+
+def _chained(position_mm: Array, pieces: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
+    """Stretches of motion, those of one way that are no more than `gap` samples apart as one."""
+    out: list[tuple[int, int]] = []
+    for first, last in pieces:
+        if last <= first:
+            continue
+        if out and first - out[-1][1] <= gap:
+            a, b = out[-1]
+            ways = position_mm[last] - position_mm[first], position_mm[b] - position_mm[a]
+            if ways[0] * ways[1] > 0.0:
+                out[-1] = a, last
+                continue
+        out.append((first, last))
+    return out
 
 
 def _told(found: Moves, time_s: Array, position_mm: Array, noise_mm: float) -> Moves:
@@ -213,11 +242,12 @@ def _trapezoids(
     fitted: Array | None = None,
     most: int = INSIDE,
     resting: NDArray[np.bool_] | None = None,
+    back: float = 0.0,
 ) -> Moves:
     """The groups that are trapezoids, within what the samples tell; `fitted`: samples to fit instead of x, `most` of a
     move. `noise`: of all of them, or of each of the groups, which begin and end at rest then. `resting`: where x is the
-    level of a rest."""
-    rest = [g for g in groups if _from_rest(moving, x, g)]
+    level of a rest. `back`: how far a step may go against the way."""
+    rest = [g for g in groups if _from_rest(moving, x, g, back)]
     if not rest:
         return {}
     starts, ends = _levels(x, moving, rest)
@@ -273,12 +303,12 @@ def _trapezoids(
     return out
 
 
-def _from_rest(moving: NDArray[np.bool_], x: Array, group: tuple[int, int]) -> bool:
+def _from_rest(moving: NDArray[np.bool_], x: Array, group: tuple[int, int], back: float = 0.0) -> bool:
     first, last = group
     if first < 1 or last > len(moving) - 1:
         return False
     steps = np.diff(x[first : last + 1])
-    return bool(np.all(steps > 0) or np.all(steps < 0))
+    return bool(np.all(steps > -back) and x[last] > x[first] or np.all(steps < back) and x[last] < x[first])
 
 
 def _levels(x: Array, moving: NDArray[np.bool_], groups: list[tuple[int, int]]) -> tuple[Array, Array]:
@@ -328,7 +358,7 @@ def _moves(
         time[k], used[k, : len(p)] = t[first], 1.0
         time[k, : len(p)], gone[k, : len(p)] = t[p], sign * (fitted[p] - starts[k])
         along = sign * (x[first : last + 1] - starts[k])
-        middle[k] = np.interp(way[k] / 2, along, t[first : last + 1])
+        middle[k] = np.interp(way[k] / 2, np.maximum.accumulate(along), t[first : last + 1])
         speed[k] = np.max(np.diff(along) / np.diff(t[first : last + 1]))
     firsts, lasts = np.array([g[0] for g in groups]), np.array([g[1] for g in groups])
     return _Moves(time, gone, used, way, middle, speed, np.array([len(p) for p in picked]), t[lasts] - t[firsts])
@@ -339,7 +369,7 @@ def _fitted(
 ) -> tuple[Array, Array, Array]:
     """Middle, speed and Σ error² of each move, by damped Gauss-Newton steps on all moves at once, (m,) each."""
     fastest = np.sqrt(acceleration * moves.way)
-    slowest = moves.way / moves.duration
+    slowest = HIDDEN * moves.way / moves.duration
     middle, speed = moves.middle.copy(), np.clip(1.02 * moves.speed, np.minimum(slowest, fastest), fastest)
     kept = np.zeros(len(middle), dtype=bool) if speed_kept is None else speed_kept
     damping = np.full(len(middle), 1e-3)

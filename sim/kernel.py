@@ -43,14 +43,14 @@ PLACES = (
 REPORT, PLAY, FRAME, PROBE, DEPTH, LAW, ELASTIC, RATE, CONTACT, GAP, SENSOR, SAMPLING = range(12)
 
 # program: sizes and offsets, where each place's blocks start, then (address, state, parameters) a block
-MODES, UNILATERAL, INNER, INNER_SIZE, TRIAL, SCRATCH, RELAX, CACHE, STARTS = range(9)
+MODES, UNILATERAL, FILM, INNER, INNER_SIZE, TRIAL, SCRATCH, RELAX, CACHE, STARTS = range(10)
 ROWS = STARTS + len(PLACES) + 1
 
 # state: what the solver keeps …
 X, Y, CELL, SLOPE, RESIDUAL, TRIAL_CELL = range(6)
 OUTER = 6
 # … and the pad's own, at INNER and in its trial copies: w_1 … w_r follow
-FE, PAD_DEPTH, PAD_FORCE, SURFACE, STEEPNESS, W = range(6)
+FE, PAD_DEPTH, PAD_FORCE, SURFACE, STEEPNESS, PULLED, W = range(7)
 
 _TOLERANCE = 4e-15
 _BESIDE = 1e-3  # of the way to the last surface, where no slope is known
@@ -173,6 +173,22 @@ def free_surface(
 
 
 @compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64)")
+def torn(program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, F: float) -> float:
+    """What a film between pad and probe bears of a tension F < 0 at the end of a step: F itself, or, once its impulse
+    is used up, the mean over the step of what it bore in it; 0 without a film, and after."""
+    if program[FILM] == 0:
+        return 0.0
+    pad = program[INNER] + shift
+    left = params[program[FILM]] - state[pad + PULLED]
+    if left <= 0.0:
+        return 0.0
+    before = state[pad + PAD_FORCE]  # the force goes linearly over the step
+    pulled = 0.5 * dt * F * F / (before - F) if before > 0.0 else 0.5 * dt * -(before + F)
+    state[pad + PULLED] += min(pulled, left)
+    return F if pulled < left else -left / dt
+
+
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64)")
 def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, y: float) -> float:
     """One step of everything between probe position and load cell, on the state moved by `shift`. F_cell in N."""
     r = program[MODES]
@@ -199,11 +215,15 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
     simple = plain and program[STARTS + GAP] == program[STARTS + GAP + 1]
     lasting = program[STARTS + ELASTIC] == program[STARTS + ELASTIC + 1]  # nothing remembers where the surface was
     off = False
+    pull = 0.0  # of a film, in N
     if program[UNILATERAL] != 0 and not (simple and lasting):
         # a pad that has let go is asked first where its surface is now
-        apart = depth < state[pad + SURFACE] and state[pad + PAD_DEPTH] < state[pad + SURFACE]
+        held = program[FILM] != 0 and 0.0 < state[pad + PULLED] < params[program[FILM]]
+        apart = not held and depth < state[pad + SURFACE] and state[pad + PAD_DEPTH] < state[pad + SURFACE]
         F = -1.0 if apart else surface_force(program, params, state, shift, dt, depth, A, B)
-        if F < 0.0:
+        if F < 0.0 and not apart:
+            pull = torn(program, params, state, shift, dt, F)
+        if F < 0.0 and pull != F:
             surface = free_surface(program, params, state, shift, dt, depth, A, B)
             off = surface > depth
             F = 0.0 if off else max(surface_force(program, params, state, shift, dt, depth, A, B), 0.0)
@@ -216,12 +236,16 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
         Fe = product(program, params, state, shift, ELASTIC, dt, depth)
         Fe *= chain(program, params, state, shift, LAW, dt, depth)
         F = A + B * Fe
-        off = program[UNILATERAL] != 0 and F < 0.0
+        if program[UNILATERAL] != 0 and F < 0.0:
+            pull = torn(program, params, state, shift, dt, F)
+            off = pull != F
         F += total(program, params, state, shift, CONTACT, dt, depth)
     if off:
         if plain:
             Fe = -A / B if B > 0.0 else 0.0
-        F = 0.0
+        F = pull
+    elif F >= 0.0:
+        state[pad + PULLED] = 0.0
     for i in range(r):
         w = state[pad + W + i]
         state[pad + W + i] = state[cache + 1 + i] * w + state[cache + 1 + r + i] * (Fe - old)

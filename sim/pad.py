@@ -32,6 +32,8 @@ class Pad:
     law: ElasticLaw
     relaxation: Relaxation
     unilateral: bool
+    film_Ns: float = 0.0
+    """Impulse of tension that a film bears before a `unilateral` pad lets go."""
 
 
 class Cascade:

@@ -40,6 +40,8 @@ def lay_out(pad: Pad, effects: Sequence[Active]) -> Layout:
     parameters: list[float] = [pad.relaxation.c_0, *pad.relaxation.shares, *pad.relaxation.rates]
     law_at = len(parameters)
     parameters += pad.law.kernel_parameters
+    film_at = len(parameters) if pad.film_Ns > 0.0 else 0
+    parameters.append(pad.film_Ns)
 
     r = pad.relaxation.order
     inner = [0.0] * (k.W + r)
@@ -76,6 +78,7 @@ def lay_out(pad: Pad, effects: Sequence[Active]) -> Layout:
     program = np.zeros(k.ROWS + 3 * len(rows), dtype=np.int64)
     program[k.MODES] = r
     program[k.UNILATERAL] = pad.unilateral
+    program[k.FILM] = film_at
     program[k.INNER] = inner_at
     program[k.INNER_SIZE] = len(inner)
     program[k.TRIAL] = trial_at

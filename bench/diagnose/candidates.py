@@ -75,6 +75,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         lower, upper = max(lower, 0.3 / reach.span_s), min(upper, 0.6 / reach.sample_s)
     elif p.unit == "Hz":
         lower, upper = max(lower, 2.0 / reach.span_s), min(upper, 0.9 / reach.sample_s)
+    elif p.name == "window":  # corners of the motion are rebuilt between samples
+        default = 0.1 * reach.sample_s
     elif p.unit == "s" and p.logarithmic:
         upper = min(upper, 3.0 * reach.span_s)
     elif p.name == "period":
@@ -98,6 +100,9 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     elif p.name == "preload":  # a joint that opens beyond all forces is none
         lower, upper = 0.02 * reach.force_N, reach.force_N
         starts = tuple(share * reach.force_N for share in (0.15, 0.3, 0.6))
+    elif p.name == "slip_force":
+        lower, upper = 0.005 * reach.force_N, reach.force_N
+        starts = tuple(share * reach.force_N for share in (0.03, 0.1))
     if lower >= upper:
         return p
     starts = tuple(v for v in starts if lower <= v <= upper)
@@ -251,7 +256,10 @@ def starts(signatures: Signatures, effect: Effect, form: Form, most: int = 2) ->
     """The most promising starts of a form, best first."""
     cause = cause_of(effect, form)
     if form.amend is not None and cause.amplitude is None:
-        return [Start(c, np.inf) for c in _amended(signatures.fit, cause)]
+        amended = _amended(signatures.fit, cause)
+        if len(amended) > most:
+            amended = sorted(amended, key=lambda c: -signatures.whole(c))
+        return [Start(c, np.inf) for c in amended[:most]]
     if cause.amplitude is None:
         tried = [cause.with_start(**values) for values in _scanned(form)]
         if len(tried) > most:
@@ -300,14 +308,17 @@ def _inside(value: float, lower: float, upper: float) -> float:
 
 
 def _amended(fit: Fit, cause: Cause, drawn: ElasticLaw | None = None) -> list[Cause]:
-    """Another law in place of the believed: numbers with which it is near `drawn`, or the curve that was fitted."""
+    """Another law in place of the believed: numbers with which it is near `drawn`, or the curve that was fitted. Where
+    the law stays, all starts."""
     structure = fit.structure
     pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
     fitted = cause.fitted
     assert cause.form.amend is not None
     amend = cause.form.amend
-    if not fitted or amend(pad, cause.start).law == pad.law:
+    if not fitted:
         return [cause]
+    if amend(pad, cause.start).law == pad.law:
+        return [cause.with_start(**values) for values in combinations(cause.form)]
     depth = np.linspace(0.02, 1.0, 60) * structure.pad.depth_mm
     wanted = (pad.law if drawn is None else drawn).force(depth)
     scale = max(float(np.abs(wanted).max()), 1e-12)

@@ -25,6 +25,7 @@ BELOW = 0.7  # of the greatest force
 MORE, SURELY = 0.05, 4.0  # of the equal pairs that chance makes, and of their deviations
 CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
 SETTLING = 20  # samples after a move that are not yet a hold
+LEAVING = 3  # samples at the end of a hold that may already move
 CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
 NEARLY = 0.95  # of a ceiling
 CEILING = 8  # samples in a row at the greatest force
@@ -406,7 +407,7 @@ def resting(m: Measurement) -> Mask:
     for s in holds(m.position_time_s, m.position_mm):
         first, last = np.searchsorted(m.force_time_s, [m.position_time_s[s.start], m.position_time_s[s.stop - 1]])
         settled = int(first) + min(int(last - first) // 4, SETTLING)
-        still[settled : int(last)] = True
+        still[settled : max(settled, int(last) - LEAVING)] = True
     return still
 
 

@@ -122,8 +122,8 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     cause = structure.causes[index]
     shape = narrowed(form, _reach(short, structure))
     told = {p.name: values[index][p.name] for p in shape.parameters if p.name in values[index]}
-    every = list(combinations(shape))
-    others = every[:: max(1, len(every) // STARTS)]
+    fresh = replace(shape, parameters=tuple(p for p in shape.parameters if p.name not in told))
+    others = [*_thinned(list(combinations(fresh))), *_thinned(list(combinations(shape)))]
     pad = lead.x[: len(structure.pad.coordinates)]
     begun: list[tuple[float, Structure, Array]] = []
     for started in [{}, *others]:
@@ -142,6 +142,10 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     best = min(tried, key=lambda fit: fit.chi2)
     member = Member(refit(short, best.structure, best.x, STEPS, NEARLY), index)
     return None if departed(member.fit, index) else member
+
+
+def _thinned(every: list[dict[str, float]]) -> list[dict[str, float]]:
+    return every[:: max(1, len(every) // STARTS)]
 
 
 def _reach(short: Data, structure: Structure) -> Reach:

@@ -66,6 +66,9 @@ def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
             wider = max(own[position] / max(leading[p.name], 1e-300), 1.0) if own[position] > 0 else 1.0
             here = every[place][p.name]
             for w, m in zip(weight[1:], members[1:], strict=True):
+                if p.name not in m.variances:  # a choice of that form, which knows no such number
+                    out[position] += w * UNKNOWN
+                    continue
                 there = m.values[p.name]
                 away = np.log(max(there, 1e-300) / here) if c.logarithmic else (there - here) / c.unit
                 more = min(max(wider * m.variances[p.name] - own[position], 0.0), own[position])

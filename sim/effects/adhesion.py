@@ -13,6 +13,13 @@
   and down to nothing at its end (G. Alfano, M. A. Crisfield, Finite element interface models for delamination, Int. J.
   Numer. Methods Eng. 50, 2001, 1701–1736: traction and separation).
 - `stretching`: a neck that pulls up to `pull_off` as it is stretched, pull_off · sin(π/2 · gap/range), and snaps.
+- `drawing`: fibrils are drawn out of a soft adhesive: up to `pull_off` at `crest` of the range, that over a share
+  `holds` of the rest, then down to nothing at its end (H. Lakrout, P. Sergot, C. Creton, Direct observation of
+  cavitation and fibrillation in a probe tack experiment on model acrylic pressure-sensitive-adhesives, J. Adhesion 69,
+  1999, 307–359).
+- `quick`: a neck that bears the more the quicker it is opened: pull_off · ((v_0 + v)/(v_0 + 10 mm/s))^n sin(π/2 ·
+  gap/range), v_0 = 0.1 mm/s (D. Maugis, M. Barquins, Fracture mechanics and the adherence of viscoelastic bodies, J.
+  Phys. D 11, 1978, 1989–2023). `pull_off` is that at 10 mm/s.
 
 `range` is the gap at which the pull has fallen to 1/e where it ends nowhere, and where it ends otherwise.
 
@@ -27,6 +34,8 @@ from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
 _ROOT = math.expm1(0.5)
+_CREEP_MM_S = 0.1
+"""Speed of opening below which `quick` falls no further."""
 _NEAR = 0.02
 """Share of the range within which a bond grows: not 0, so that the force has no jump at touch."""
 
@@ -81,6 +90,34 @@ def stretching(dt: float, gap: float, state: State, p: State) -> float:
     elif gap <= 0.0:
         state[0] = 1.0
     return -p[0] * state[0] * math.sin(0.5 * math.pi * gap / p[1])
+
+
+@block
+def drawing(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range, crest, holds); state: whether there is a bond."""
+    if gap >= p[1]:
+        state[0] = 0.0
+    elif gap <= 0.0:
+        state[0] = 1.0
+    if state[0] == 0.0:
+        return 0.0
+    stretched = gap / p[1]
+    ends = (1.0 - p[2]) * (1.0 - p[3])  # share of the range in which it tears
+    return -p[0] * min(stretched / p[2], 1.0, (1.0 - stretched) / ends)
+
+
+@block
+def quick(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range, exponent); state: whether there is a bond, gap before, speed of opening."""
+    if gap >= p[1]:
+        state[0] = 0.0
+    elif gap <= 0.0:
+        state[0] = 1.0
+    if dt > 0.0:
+        state[2] = max(gap - state[1], 0.0) / dt
+    state[1] = gap
+    hard = ((_CREEP_MM_S + state[2]) / (_CREEP_MM_S + 10.0)) ** p[2]
+    return float(-p[0] * state[0] * hard * math.sin(0.5 * math.pi * gap / p[1]))
 
 
 _PULL_OFF = Parameter(
@@ -153,6 +190,33 @@ EFFECT = Effect(
             sought=False,
             blocks={"gap": stretching},
             state=(0.0,),
+        ),
+        Form(
+            name="drawing",
+            what="fibrils that hold until they tear",
+            parameters=(
+                _PULL_OFF,
+                _RANGE,
+                Parameter(
+                    "crest", "1", 0.02, 0.9, 0.2, "share of the range at which it pulls most", starts=(0.15, 0.4)
+                ),
+                Parameter("holds", "1", 0.0, 0.98, 0.6, "share of the rest over which it holds that", starts=(0.6,)),
+            ),
+            sought=False,
+            blocks={"gap": drawing},
+            state=(0.0,),
+        ),
+        Form(
+            name="quick",
+            what="a neck that bears more the quicker it is opened",
+            parameters=(
+                _PULL_OFF,
+                _RANGE,
+                Parameter("exponent", "1", 0.0, 1.0, 0.15, "power of the speed", starts=(0.15,)),
+            ),
+            sought=False,
+            blocks={"gap": quick},
+            state=(0.0, 0.0, 0.0),
         ),
     ),
 )

@@ -7,6 +7,9 @@
   operator: M. Brokate, J. Sprekels, Hysteresis and Phase Transitions, Springer, 1996).
 - `loaded`: the gap is closed by the force itself, within `closing_force`: a joint that is loose at rest and seated
   under load. Deflection gap · (1 − e^(−|F|/closing_force)) in the force's direction, solved with the pad.
+- `running_out`: the width goes with the place, gap · (1 + swell · sin(2π x/turn + angle)): a gear, pulley or screw that
+  runs out, or is worn where it is used most (ISO 230-2: the reversal value is stated for each
+  place). `gap` is the mean.
 
 Reference: M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash, a survey, Automatica 38, 2002,
 1633–1649.
@@ -17,6 +20,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.waves import phase
 from sim.jit import State, block
 
 _STARTED = 0
@@ -54,6 +58,17 @@ def gradual(dt: float, x: float, state: State, p: State) -> float:
         result += 0.25 * state[1 + i]
     state[_STARTED] = 1.0
     return result
+
+
+@block
+def running_out(dt: float, x: float, state: State, p: State) -> float:
+    """Probe side, from x to x + the gap there; p = (gap, swell, turn, angle, start)."""
+    gap = p[0] * (1.0 + p[1] * math.sin(2.0 * math.pi * x / p[2] + p[3]))
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[1] = x + gap * p[4]
+    state[1] = min(max(state[1], x), x + gap)
+    return state[1]
 
 
 @block
@@ -108,6 +123,20 @@ EFFECT = Effect(
             ),
             blocks={"play": gradual},
             state=(0.0,) * 5,
+        ),
+        Form(
+            name="running_out",
+            what="wider here than there",
+            parameters=(
+                _GAP,
+                Parameter("swell", "1", 0.0, 1.0, 0.3, "how much wider, over the mean", starts=(0.3,)),
+                Parameter("turn", "mm", 0.1, 50.0, 1.0, "distance after which it is as wide", starts=(0.6, 1.1, 2.5)),
+                phase("angle", "phase of the width at position 0"),
+                _START,
+            ),
+            sought=False,
+            blocks={"play": running_out},
+            state=(0.0, 0.0),
         ),
         Form(
             name="loaded",

@@ -7,6 +7,9 @@
   the full width `trail`.
 - `slotted`: tanh(steepness · sin) over its own first harmonic, of that amplitude: flat over teeth and slots, steep at
   their edges.
+- `two_periods`: with a second sine of `order` waves for each of the first, which need not be whole: slots that are no
+  multiple of the poles, and magnets that are not alike (J. R. Hendershot, T. J. E. Miller, Design of Brushless
+  Permanent-Magnet Machines, 2nd ed., Motor Design Books, 2010).
 
 Reference: J. F. Gieras, Z. J. Piech, B. Z. Tomczuk, Linear Synchronous Motors: Transportation and Automation Systems,
 2nd ed., CRC Press, 2012 (cogging and detent force).
@@ -18,7 +21,7 @@ import math
 from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
-from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC
+from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC, phase
 from sim.jit import State, block
 
 
@@ -55,6 +58,13 @@ def trailing(dt: float, y: float, state: State, p: State) -> float:
 def slotted(dt: float, y: float, state: State, p: State) -> float:
     """Force in N; p = (amplitude over the first harmonic of the wave, period, phase, steepness)."""
     return p[0] * math.tanh(p[3] * math.sin(2.0 * math.pi * y / p[1] + p[2]))
+
+
+@block
+def two_periods(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, ratio, order, second_phase)."""
+    angle = 2.0 * math.pi * y / p[1]
+    return p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(p[4] * angle + p[5]))
 
 
 def _of_the_first_harmonic(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -136,6 +146,20 @@ EFFECT = Effect(
             ),
             blocks={"probe": slotted},
             pack=_of_the_first_harmonic,
+        ),
+        Form(
+            name="two_periods",
+            what="two sines whose periods are no multiple of each other",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("ratio", "1", 0.0, 1.0, 0.3, "second amplitude over the first"),
+                Parameter("order", "1", 1.2, 4.0, 1.5, "waves of the second for each of the first", starts=(1.3, 1.6)),
+                phase("second_phase", "phase of the second at position 0"),
+            ),
+            sought=False,
+            blocks={"probe": two_periods},
         ),
     ),
 )

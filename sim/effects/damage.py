@@ -10,6 +10,8 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   Kachanov's law, which ends in rupture, has k = −3 or so.
 - `energy`: as exponential, in the travel weighed by (n + 1) (δ/reach)^n, as the work of a spring F ∝ δ^n: deep travel
   counts more, and a stroke down to `reach` as much as elsewhere.
+- `threshold`: e^(−rate · travel/(1 − spared)) of the travel deeper than `spared` times `reach` alone: what stays above
+  does no harm (Lemaitre's p_D). A stroke down to `reach` costs as much as elsewhere.
 
 `rate` is what a mm of travel takes at first, of the stiffness.
 
@@ -84,6 +86,14 @@ def energy(dt: float, depth: float, state: State, p: State) -> float:
     return p[2] + (1.0 - p[2]) * math.exp(-p[0] * state[_TRAVEL] / (1.0 - p[2]))
 
 
+@block
+def threshold(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, spared, reach, dead_band)."""
+    limit = p[1] * p[2]
+    state[_LAST], state[_TRAVEL] = loaded(depth - limit, p[3], state[_LAST], state[_TRAVEL])
+    return math.exp(-p[0] * state[_TRAVEL] / (1.0 - p[1]))
+
+
 _RATE = Parameter(
     "rate",
     "1/mm",
@@ -152,6 +162,19 @@ EFFECT = Effect(
                 _DEAD_BAND,
             ),
             blocks={"elastic": energy},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="threshold",
+            what="with loading travel beyond a depth alone",
+            parameters=(
+                _RATE,
+                Parameter("spared", "1", 0.0, 0.9, 0.3, "limit over `reach`", starts=(0.2, 0.4, 0.6)),
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth of a stroke on which `rate` is the mean", fixed=True),
+                _DEAD_BAND,
+            ),
+            sought=False,
+            blocks={"elastic": threshold},
             state=(0.0, 0.0),
         ),
     ),

@@ -14,6 +14,13 @@ of K. The force used is the one at the cell, solved within the step (sim/kernel.
   P, rounded over r P since faces part bit by bit: m(F) = (F + √(P² + (r P)²) − √((F − P)² + (r P)²))/2 (J. H. Bickford,
   Introduction to the Design and Behavior of Bolted Joints, 4th ed., CRC, 2008).
 - `closing`: the same with k > 1: faces that are not yet home are soft until P has closed the joint.
+- `slipping`: C ((1 − s) F + s G), where G is the middle of a play of the full width 2 `slip_force` that F drags along.
+  A share s sits in joints whose edges stick until the force has changed by that width, and slip then. The curve is a
+  loop; C is the mean of its two ways (W. D. Iwan, J. Appl. Mech. 33, 1966, 893–900; L. Gaul, R. Nitsche, The role of
+  friction in mechanical joints, Appl. Mech. Rev. 54, 2001, 93–106).
+- `creeping`: C ((1 − s) F + s G)/(1 − s/2), where G follows F with a time constant: parts of plastic or glue creep. C
+  is the middle of at once and at last (W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear
+  Viscoelastic Materials, North-Holland, 1976). Exact for a force that is linear between samples.
 
 Reference: W. C. Oliver, G. M. Pharr, J. Mater. Res. 7, 1992, 1564–1583: the compliance measured is that of the
 contact plus that of the load frame.
@@ -55,6 +62,24 @@ def joint(dt: float, force: float, state: State, p: State) -> float:
     below_at = 0.5 * (p[4] + rest - math.sqrt((p[4] - p[1]) * (p[4] - p[1]) + wide * wide))
     opened = math.copysign(size - (1.0 - p[2]) * below, force)
     return p[0] * p[4] * opened / (p[4] - (1.0 - p[2]) * below_at)
+
+
+@block
+def slipping(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection in mm; p = (compliance, share, slip_force); state: the force that the joints have followed."""
+    state[0] = min(max(state[0], force - p[2]), force + p[2])
+    return p[0] * ((1.0 - p[1]) * force + p[1] * state[0])
+
+
+@block
+def creeping(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection in mm; p = (compliance, share, time_constant); state: the late force, and the force before."""
+    x = dt / p[2]
+    keep = math.exp(-x)
+    mean = -math.expm1(-x) / x if x > 0.0 else 1.0  # of the decay over the step
+    state[0] = force - (force - state[1]) * mean + (state[0] - state[1]) * keep
+    state[1] = force
+    return p[0] * ((1.0 - p[1]) * force + p[1] * state[0]) / (1.0 - 0.5 * p[1])
 
 
 def _compliance(what: str) -> Parameter:
@@ -126,6 +151,32 @@ EFFECT = Effect(
                 _AT_FORCE,
             ),
             blocks={"frame": joint},
+        ),
+        Form(
+            name="slipping",
+            what="in part in joints that slip",
+            parameters=(
+                _compliance("deflection per newton, the mean of both ways"),
+                Parameter("share", "1", 0.0, 1.0, 0.3, "share of the joints that slip", starts=(0.3,)),
+                Parameter(
+                    "slip_force", "N", 1e-3, 1e4, 0.3, "half the change of force before they slip", starts=(0.1, 1.0)
+                ),
+            ),
+            sought=False,
+            blocks={"frame": slipping},
+            state=(0.0,),
+        ),
+        Form(
+            name="creeping",
+            what="in part late, as plastic and glue",
+            parameters=(
+                _compliance("deflection per newton, the middle of at once and at last"),
+                Parameter("share", "1", 0.0, 1.0, 0.15, "share that comes late", starts=(0.15,)),
+                Parameter("time_constant", "s", 1e-3, 1e3, 1.0, "how late it comes", starts=(0.1, 0.6, 4.0)),
+            ),
+            sought=False,
+            blocks={"frame": creeping},
+            state=(0.0, 0.0),
         ),
     ),
 )

@@ -17,6 +17,15 @@ since the last reversal, rises with it, and is a continuous function of position
   the probe stands in the pad (F. P. Bowden, D. Tabor, The Friction and Lubrication of Solids, Oxford, 1950).
 - `maxwell_slip`: five of Prandtl's elements side by side, their distances spread geometrically: the build-up is gradual
   and remembers inner loops (W. D. Iwan, J. Appl. Mech. 33, 1966, 893–900).
+- `worked_in`: Prandtl's element whose slider holds F_c (1 + stiffness s): grease that has lain is stiffer, gets worked
+  in along the way, and comes back at rest: s' = (1 − s)/rest − s |v|/way, whole at first (P. M. Lugt, Grease
+  Lubrication in Rolling Bearings, Wiley, 2013). `coulomb` is what is left when it is worked in.
+- `uneven`: Prandtl's element whose slider holds another force at each place, as between rails that are not parallel:
+  F_c (1 + two terms of a Fourier series over `reach`), so that F_c is the mean over the depths (B. Armstrong-Hélouvry,
+  Control of Machines with Friction, Kluwer, 1991: friction depends on the position).
+- `logarithmic`: Prandtl's element whose slider holds F_c (1 + growth ln((v_0 + |v|)/(v_0 + 1 mm/s))), v_0 = 0.1 mm/s:
+  polymers creep over what they slide on, and so bear more the quicker they go (B. J. Briscoe, D. Tabor, Friction and
+  wear of polymers: the role of mechanical properties, Br. Polym. J. 10, 1978, 74–78). F_c is that at 1 mm/s.
 
 State: last position, force, whether there was a position yet. A first position is rest without friction force.
 """
@@ -29,6 +38,9 @@ from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
 _LAST, _FORCE, _STARTED, _DEPTH = range(4)
+_GREASE = 3
+_CREEP_MM_S = 0.1
+"""Speed below which `logarithmic` falls no further."""
 _FIRST, _ELEMENTS = 3, 5
 
 
@@ -109,6 +121,58 @@ def load_dependent(dt: float, y: float, state: State, p: State) -> float:
     force = max(-limit, min(limit, force))
     state[_FORCE] = force
     return force
+
+
+@block
+def worked_in(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element behind grease; p = (coulomb, stiffness, way, rest, presliding); state: the grease's too."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_LAST] = y
+        state[_GREASE] = 1.0
+    moved = y - state[_LAST]
+    state[_LAST] = y
+    back, gone = dt / p[3], abs(moved) / p[2]
+    if back + gone > 0.0:  # exact where speed is constant
+        settled = back / (back + gone)
+        state[_GREASE] = settled + (state[_GREASE] - settled) * math.exp(-back - gone)
+    limit = p[0] * (1.0 + p[1] * state[_GREASE])
+    force = max(-limit, min(limit, state[_FORCE] + moved * (limit / p[4])))
+    state[_FORCE] = force
+    return force
+
+
+@block
+def uneven(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element over uneven ground; p = (coulomb, sine_1, cosine_1, sine_2, cosine_2, reach, presliding)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    angle = 2.0 * math.pi * y / p[5]
+    more = p[1] * math.sin(angle) + p[2] * math.cos(angle) + p[3] * math.sin(2.0 * angle) + p[4] * math.cos(2.0 * angle)
+    limit = p[0] * max(1.0 + more, 0.0)
+    force = state[_FORCE] + moved * (p[0] / p[6])
+    force = max(-limit, min(limit, force))
+    state[_FORCE] = force
+    return force
+
+
+@block
+def logarithmic(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element with a slider that depends on speed; p = (coulomb, growth, presliding)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    speed = abs(moved) / dt if dt > 0.0 else 0.0
+    limit = p[0] * max(1.0 + p[1] * math.log((_CREEP_MM_S + speed) / (_CREEP_MM_S + 1.0)), 0.0)
+    force = state[_FORCE] + moved * (p[0] / p[2])
+    force = max(-limit, min(limit, force))
+    state[_FORCE] = force
+    return force
+
+
+def _term(name: str, what: str) -> Parameter:
+    return Parameter(name, "1", -1.0, 1.0, 0.0, f"{what} of the level, over `coulomb`")
 
 
 _COULOMB = Parameter(
@@ -222,6 +286,48 @@ EFFECT = Effect(
             ),
             blocks={"depth": note_depth, "probe": load_dependent},
             state=(0.0, 0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="worked_in",
+            what="more at first, until the grease is worked in",
+            parameters=(
+                _COULOMB,
+                Parameter("stiffness", "1", 0.0, 5.0, 0.5, "what fresh grease adds, over `coulomb`", starts=(0.5,)),
+                Parameter("way", "mm", 0.1, 1e3, 10.0, "distance in which it is worked in", starts=(3.0, 15.0)),
+                Parameter("rest", "s", 0.1, 1e4, 30.0, "time in which it comes back", starts=(10.0, 100.0)),
+                _PRESLIDING,
+            ),
+            sought=False,
+            blocks={"probe": worked_in},
+            state=(0.0, 0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="uneven",
+            what="another at each place",
+            parameters=(
+                _COULOMB,
+                _term("sine_1", "one wave over the reach"),
+                _term("cosine_1", "the same, from its crest,"),
+                _term("sine_2", "two waves over the reach"),
+                _term("cosine_2", "the same, from their crest,"),
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth over which `coulomb` is the mean", fixed=True),
+                _PRESLIDING,
+            ),
+            sought=False,
+            blocks={"probe": uneven},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="logarithmic",
+            what="grows with the logarithm of the speed, as of polymers",
+            parameters=(
+                _COULOMB,
+                Parameter("growth", "1", 0.0, 0.4, 0.05, "relative growth for each e-fold of speed", starts=(0.05,)),
+                _PRESLIDING,
+            ),
+            sought=False,
+            blocks={"probe": logarithmic},
+            state=(0.0, 0.0, 0.0),
         ),
     ),
 )

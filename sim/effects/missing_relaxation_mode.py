@@ -14,6 +14,9 @@ enough, the believed modes give way too, in proportion: c_0 is then 0.
 - `fractional`: share · E_α(−(rate t)^α) with Mittag-Leffler's function, a fractional element (R. C. Koeller, J. Appl.
   Mech. 51, 1984, 299–307). Its rates are spread as by K. S. Cole, R. H. Cole, J. Chem. Phys. 9, 1941, 341–351: ten
   modes at quantiles.
+- `consolidation`: water that is pressed out of a layer, 8/π² Σ e^(−(2k+1)² rate t)/(2k+1)²: four fifths go at `rate`
+  itself (K. Terzaghi, Theoretical Soil Mechanics, Wiley, 1943; M. A. Biot, J. Appl. Phys. 12, 1941, 155–164). Ten
+  modes, the last of which takes what is left.
 """
 
 from __future__ import annotations
@@ -106,6 +109,14 @@ def _fractional(pad: Pad, values: Mapping[str, float]) -> Pad:
     return _with_modes(pad, shares, [float(values["rate"] * k) for k in rates])
 
 
+def _consolidation(pad: Pad, values: Mapping[str, float]) -> Pad:
+    odd = 2.0 * np.arange(NODES) + 1.0
+    weights = 8.0 / (math.pi * odd) ** 2
+    weights[-1] += 1.0 - weights.sum()
+    shares = [float(values["share"] * w) for w in weights]
+    return _with_modes(pad, shares, [float(values["rate"] * k) for k in odd**2])
+
+
 _SHARE = Parameter(
     "share", "1", 0.0, 1.0, 0.1, "share of the force that relaxes in this way", required=True, amplitude=True
 )
@@ -169,6 +180,13 @@ EFFECT = Effect(
             ),
             sought=False,
             amend=_fractional,
+        ),
+        Form(
+            name="consolidation",
+            what="water that is pressed out (Terzaghi)",
+            parameters=(_SHARE, _RATE),
+            sought=False,
+            amend=_consolidation,
         ),
     ),
 )

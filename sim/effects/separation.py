@@ -1,10 +1,14 @@
-"""Separation: the lab believes the pad bonded to the probe, and it lets go.
+"""Separation: the lab believes `bonded`, and the pad lets go.
 
-Where the force would be negative there is none, and the surface comes back by relaxation on its own (docs/formats.md,
-Contact). Nothing to fit: the pad is unilateral or it is not.
+- `unilateral`: where the force would be negative there is none, and the surface comes back by relaxation on its own
+  (docs/formats.md, Contact). Nothing to fit: the pad is unilateral or it is not.
+- `film`: a film of grease or water between pad and probe bears tension first, until it has grown too thick: by Stefan's
+  law F dt goes with d(1/h²), so that a film of any first thickness well below its last bears an impulse and no more. It
+  closes when pad and probe are pressed together again.
 
 Reference: T. C. T. Ting, The contact stresses between a rigid indenter and a viscoelastic half-space, J. Appl. Mech.
-33, 1966, 845–854 (receding contact on a surface that recovers).
+33, 1966, 845–854 (receding contact on a surface that recovers); J. Stefan, Versuche über die scheinbare Adhäsion,
+Sitzungsber. Akad. Wiss. Wien 69, 1874, 713–735 (the impulse that parts two plates in a liquid).
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from sim.effects.base import Effect, Form
+from sim.effects.base import Effect, Form, Parameter
 
 if TYPE_CHECKING:
     from sim.pad import Pad
@@ -23,11 +27,33 @@ def _lets_go(pad: Pad, values: Mapping[str, float]) -> Pad:
     return replace(pad, unilateral=True)
 
 
+def _lets_go_late(pad: Pad, values: Mapping[str, float]) -> Pad:
+    return pad if pad.unilateral else replace(pad, unilateral=True, film_Ns=values["impulse"])
+
+
 EFFECT = Effect(
     id="separation",
     what="The pad lets go where the model believes it bonded.",
     says="the pad lets go of the probe instead of pulling on it",
     check="look at the pad while the probe goes back: does it stick? Model it as `contact: unilateral`",
     reference="Ting, J. Appl. Mech. 33, 1966, 845-854",
-    forms=(Form(name="unilateral", what="no force where the pad would pull", parameters=(), amend=_lets_go),),
+    forms=(
+        Form(name="unilateral", what="no force where the pad would pull", parameters=(), amend=_lets_go),
+        Form(
+            name="film",
+            what="a film bears an impulse of tension before it lets go",
+            parameters=(
+                Parameter(
+                    "impulse",
+                    "N*s",
+                    1e-6,
+                    1e3,
+                    0.02,
+                    "tension over time that parts pad and probe",
+                    starts=tuple(10.0 ** (k / 4) for k in range(-16, 5)),
+                ),
+            ),
+            amend=_lets_go_late,
+        ),
+    ),
 )

@@ -3,6 +3,11 @@
 The factor on F^e depends on depth δ and on the deepest depth so far; loading beyond it follows the virgin curve.
 
 - `exponential`: 1 − share (1 − e^(−(deepest − δ)/depth)).
+- `virgin`: (1 − D(deepest))/(1 − D(δ)) with that damage D(δ) = share (1 − e^(−δ/depth)): the law is the curve of the
+  pad as it is loaded first, D in it.
+- `ratio`: (δ/deepest)^a, with an exponent a by which the share is gone at twice `depth` below `reach` (Z. Q. Guo, L. J.
+  Sluys, Computational modelling of the stress-softening phenomenon of rubber-like materials under cyclic loading, Eur.
+  J. Mech. A 25, 2006, 877–896). One number: `depth` only says where the share is stated.
 - `preconditioned`: the same on a pad that had been pressed to `already` before the data begin.
 - `linear`: 1 − share · min(1, (deepest − δ)/depth).
 - `ogden_roxburgh`: 1 − share · erf((W_max − W)/(w + growth · W_max)), with energies W that go with δ^power (2: a linear
@@ -20,6 +25,7 @@ State: the deepest depth. Reference: L. Mullins, Softening of rubber by deformat
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
@@ -52,6 +58,31 @@ def ogden_roxburgh(dt: float, depth: float, state: State, p: State) -> float:
         scale = (p[1] / p[4]) ** p[2]
     grown = (1.0 + p[3] * most) / (1.0 + p[3])
     return 1.0 - p[0] * math.erf((most - (here / p[4]) ** p[2]) / (scale * grown))
+
+
+@block
+def ratio(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (exponent, already)."""
+    here = max(depth, 0.0)
+    state[0] = max(state[0], here, p[1])
+    return (here / state[0]) ** p[0] if state[0] > 0.0 else 1.0
+
+
+@block
+def virgin(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (share, depth, already)."""
+    here = max(depth, 0.0)
+    state[0] = max(state[0], here, p[2])
+    return (1.0 + p[0] * math.expm1(-state[0] / p[1])) / (1.0 + p[0] * math.expm1(-here / p[1]))
+
+
+def _exponent(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `ratio` reads."""
+    left = 1.0 - min(2.0 * values["depth"] / values["reach"], _IN_THE_PAD)
+    return (math.log1p(-values["share"]) / math.log(left), values["already"])
+
+
+_IN_THE_PAD = 0.8
 
 
 @block
@@ -117,6 +148,39 @@ EFFECT = Effect(
             parameters=(_SHARE, _DEPTH, _ALREADY),
             blocks={"elastic": discontinuous_damage},
             state=(0.0,),
+        ),
+        Form(
+            name="virgin",
+            what="damage by the deepest point, which is in the first loading already",
+            parameters=(_SHARE, _DEPTH, _ALREADY),
+            blocks={"elastic": virgin},
+            state=(0.0,),
+        ),
+        Form(
+            name="ratio",
+            what="softer by a power of the depth over the deepest",
+            parameters=(
+                Parameter(
+                    "share",
+                    "1",
+                    0.0,
+                    0.98,
+                    0.2,
+                    "share of the stiffness that is gone at twice `depth` below `reach`",
+                    required=True,
+                    amplitude=True,
+                    starts=(0.2,),
+                ),
+                Parameter(
+                    "depth", "mm", 1e-3, 100.0, 0.5, "half the distance at which it is gone", required=True, fixed=True
+                ),
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth below which `depth` counts", fixed=True),
+                _ALREADY,
+            ),
+            sought=False,
+            blocks={"elastic": ratio},
+            state=(0.0,),
+            pack=_exponent,
         ),
         Form(
             name="preconditioned",

@@ -45,6 +45,25 @@ def test_a_short_step_out_of_a_rest_is_motion() -> None:
     assert np.mean(np.interp(t[out], told.time_s, told.position_mm) - staircase(t)[out]) > 5 * NOISE_MM
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_slow_move_is_one_whatever_its_noise(seed: int) -> None:
+    """A mass would feel each piece of it stop and start."""
+    t = np.arange(0.0, 40.0, STEP_S)
+    x = trapezoid(t, 5.0, 1.5, 0.3, 1000.0) + sum(trapezoid(t, 18.0 + 4 * k, 0.3, 20.0, 1000.0) for k in range(5))
+    told = felt(t, x + NOISE_MM * np.random.default_rng(seed).standard_normal(t.size))
+    cruising = (told.time_s > 5.1) & (told.time_s < 9.9)
+    speed = np.diff(told.position_mm[cruising]) / np.diff(told.time_s[cruising])
+    assert np.abs(speed - 0.3).max() < 1e-3
+
+
+def test_two_moves_with_a_short_rest_between_stay_two() -> None:
+    t = np.arange(0.0, 40.0, STEP_S)
+    x = sum(trapezoid(t, 6.0 + 6 * k + late, 0.4, 20.0, 1000.0) for k in range(5) for late in (0.0, 0.08))
+    told = felt(t, x + NOISE_MM * np.random.default_rng(3).standard_normal(t.size))
+    off = np.interp(t, told.time_s, told.position_mm) - x
+    assert np.abs(off).max() < 5 * NOISE_MM
+
+
 @pytest.mark.parametrize(
     ("steps", "pauses"),
     [

@@ -105,6 +105,40 @@ class TestFriction:
         assert_allclose(force, [0.0, 0.5, -0.5], atol=1e-13)
         assert_allclose(probe, [0.0, 0.95, 0.05], atol=1e-13)
 
+    def test_grease_is_worked_in_along_the_way_and_comes_back_at_rest(self) -> None:
+        numbers = {"coulomb": 0.1, "stiffness": 0.5, "way": 2.0, "rest": 30.0, "presliding": 1e-3}
+        for n in (60, 3000):
+            plant = Cascade(AIR, [active("friction", "worked_in", **numbers)]).plant()
+            plant.step(0.0, 0.0)
+            for x in np.linspace(0.0, 6.0, n + 1)[1:]:
+                force = plant.step(3.0 / n, x)  # 2 mm/s
+            settled = (1 / 30) / (1 / 30 + 2 / 2)
+            grease = settled + (1 - settled) * math.exp(-3.0 / 30.0 - 6.0 / 2.0)
+            assert_allclose(force, 0.1 * (1 + 0.5 * grease), rtol=1e-9)
+            plant.step(20.0, 6.0)
+            grease = 1 - (1 - grease) * math.exp(-20.0 / 30.0)
+            assert_allclose(plant.step(1e-9, 6.01), 0.1 * (1 + 0.5 * grease), rtol=0.01)
+
+    def test_friction_that_is_another_at_each_place(self) -> None:
+        terms = {"sine_1": 0.2, "cosine_1": -0.1, "sine_2": 0.1, "cosine_2": 0.15}
+        plant = Cascade(AIR, [active("friction", "uneven", coulomb=0.1, reach=2.0, presliding=1e-3, **terms)]).plant()
+        plant.step(0.0, 0.0)
+        x = np.linspace(0.0, 2.0, 401)[1:]
+        forth = np.array([plant.step(1e-3, p) for p in x])
+        back = np.array([plant.step(1e-3, p) for p in x[-2::-1]])
+        assert_allclose(forth[:-1], -back[::-1], atol=1e-12)
+        assert_allclose(forth.mean(), 0.1, rtol=1e-9)
+        angle = np.pi * x
+        level = 0.2 * np.sin(angle) - 0.1 * np.cos(angle) + 0.1 * np.sin(2 * angle) + 0.15 * np.cos(2 * angle)
+        assert_allclose(forth, 0.1 * (1 + level), atol=1e-12)
+
+    def test_friction_of_polymers_goes_with_the_logarithm_of_speed(self) -> None:
+        for speed, factor in ((1.0, 1.0), (1.1 * math.e - 0.1, 1.05), (0.0, 1 + 0.05 * math.log(0.1 / 1.1))):
+            plant = Cascade(AIR, [active("friction", "logarithmic", coulomb=0.1, growth=0.05, presliding=1e-3)]).plant()
+            plant.step(0.0, 0.0)
+            plant.step(1.0, 5.0)
+            assert_allclose(plant.step(0.5, 5.0 + 0.5 * speed), 0.1 * factor, rtol=1e-12)
+
     def test_load_dependent_friction_grows_with_depth(self) -> None:
         x = ramp(2.0, 2001)
         grows = active("friction", "load_dependent", coulomb=0.05, load=0.5)
@@ -158,6 +192,30 @@ class TestOtherFrames:
         assert_allclose(before / after, before_over_after, rtol=0.01)
         assert_allclose(deflection(20.0) - after * 18.0, before * 2.0, rtol=0.01)  # the lines meet at 2 N
 
+    def test_joints_that_slip_make_a_loop_about_the_spring(self) -> None:
+        """Half way between turns far apart both ways are the spring's, less and more by the share of the play."""
+        block = active("frame_compliance", "slipping").form.blocks["frame"]
+        state, p = np.zeros(1), [0.02, 0.3, 0.5]
+        force = 5.0 - np.abs(np.linspace(-5.0, 5.0, 2001))
+        deflection = np.array([block(1e-3, f, state, p) for f in force])
+        up, down = deflection[200:780], deflection[::-1][200:780]
+        assert_allclose(0.5 * (up + down), 0.02 * force[200:780], rtol=1e-9)
+        assert_allclose(down - up, 2 * 0.02 * 0.3 * 0.5, rtol=1e-9)
+
+    @pytest.mark.parametrize("n", [4, 400])
+    def test_a_frame_that_creeps(self, n: int) -> None:
+        """Under a force that rises for 1 s and stays, at any step."""
+        block = active("frame_compliance", "creeping").form.blocks["frame"]
+        compliance, share, tau = 0.02, 0.2, 0.7
+        t = np.arange(4 * n + 1) / n
+        state, p = np.zeros(2), [compliance, share, tau]
+        deflection = [block(dt, f, state, p) for dt, f in zip(np.diff(t, prepend=0.0), np.minimum(t, 1.0), strict=True)]
+        late = np.where(
+            t <= 1.0, t - tau * -np.expm1(-t / tau), 1.0 - tau * -np.expm1(-1.0 / tau) * np.exp(-(t - 1.0) / tau)
+        )
+        wanted = compliance * ((1 - share) * np.minimum(t, 1.0) + share * late) / (1 - share / 2)
+        assert_allclose(deflection, wanted, atol=1e-14)
+
     @pytest.mark.parametrize("form", ["stiffening", "power", "joint", "closing"])
     def test_the_frame_is_solved_with_the_pad(self, form: str) -> None:
         frame = active("frame_compliance", form, compliance=0.05)
@@ -200,6 +258,12 @@ class TestBacklash:
         closing = np.diff(probe[1000:1200]) / np.diff(x[1000:1200])
         assert_allclose(closing[: round(first / 1e-3)], 0.0, atol=1e-9)
         assert_allclose(np.unique(np.round(closing, 9)), [0.0, 0.25, 0.5, 0.75, 1.0])
+
+    def test_a_play_that_runs_out_is_as_wide_as_its_place_says(self) -> None:
+        x, probe, _ = self.loop("running_out", gap=0.1, swell=0.3, turn=0.7, angle=0.5)
+        gap = 0.1 * (1 + 0.3 * np.sin(2 * np.pi * x / 0.7 + 0.5))
+        back = slice(1150, 2001)
+        assert_allclose(probe[back] - x[back], gap[back], atol=1e-12)
 
     def test_a_loaded_joint_seats_within_the_closing_force(self) -> None:
         _, probe = Cascade(LINEAR, [active("backlash", "loaded", gap=0.05, closing_force=0.1)]).probe([0, 1], [0, 3.0])
@@ -305,6 +369,21 @@ class TestInertia:
         energy = 0.5e-3 * 0.3 * (1 + 0.4 * (x - 0.8)) * speed**2
         assert_allclose(work, energy, atol=2e-3 * energy.max())
 
+    def test_a_bench_that_recoils_takes_a_share_of_a_sudden_acceleration(self) -> None:
+        """s²/(s² + 2 ζ ω s + ω²) of a step is e^(−ζωt) (cos ω_d t − ζω/ω_d sin ω_d t)."""
+        share, frequency, damping = 0.15, 8.0, 0.1
+        t = np.arange(2001) * 5e-4
+        x = 10.0 * np.maximum(t - 0.01, 0.0) ** 2
+        numbers = {"mass": 0.5, "share": share, "frequency": frequency, "damping_ratio": damping, "lead": 0.0}
+        force = simulate(AIR, [active("inertia", "recoiling", window=5e-4, **numbers)], t, x)
+        omega = 2 * math.pi * frequency
+        swung = omega * math.sqrt(1 - damping**2)
+        since = t[40:] - 0.01
+        ground = np.exp(-damping * omega * since) * (
+            np.cos(swung * since) - damping * omega / swung * np.sin(swung * since)
+        )
+        assert_allclose(force[40:], 0.5e-3 * 20.0 * (1 - share * ground), rtol=3e-3)
+
     def test_a_part_that_hangs_is_so_much_of_the_sprung_mass_and_of_the_rigid_one(self) -> None:
         x = 3.0 * np.sin(2 * np.pi * 4.0 * self.t)
         sprung = {"frequency": 20.0, "damping_ratio": 0.3}
@@ -330,6 +409,13 @@ class TestPeriodic:
         numbers = {"amplitude": 0.2, "period": 1.6, "phase": 0.3, "growth": 0.1, "at_depth": 1.0}
         force = simulate(AIR, [active("cogging", "swelling", **numbers)], x + 5, x)
         assert_allclose(force, 0.2 * (1 + 0.1 * (x - 1)) * np.sin(2 * np.pi * x / 1.6 + 0.3), atol=1e-14)
+
+    def test_a_ripple_of_two_periods(self) -> None:
+        x = np.linspace(-5.0, -1.0, 801)
+        numbers = {"amplitude": 0.2, "period": 1.6, "phase": 0.3, "ratio": 0.4, "order": 1.5, "second_phase": 1.0}
+        force = simulate(AIR, [active("cogging", "two_periods", **numbers)], x + 5, x)
+        angle = 2 * np.pi * x / 1.6
+        assert_allclose(force, 0.2 * np.sin(angle + 0.3) + 0.08 * np.sin(1.5 * angle + 1.0), atol=1e-14)
 
     @pytest.mark.parametrize("steepness", [0.1, 2.5, 10.0])
     def test_a_ripple_of_teeth_has_its_amplitude_in_the_first_harmonic(self, steepness: float) -> None:

@@ -112,6 +112,16 @@ class TestMissingMode:
         seen = self.t < 10
         assert_allclose(out[seen], 0.5 + 0.5 * (1 + self.t[seen] / tau) ** -power, atol=0.5 * 0.01)
 
+    def test_consolidation_of_a_layer(self) -> None:
+        """The mean pressure of water in a layer: a third of its way out by the root of time at first (Terzaghi)."""
+        numbers = {"share": 0.5, "rate": 2.0}
+        out = self.relaxed(LINEAR, [active("missing_relaxation_mode", "consolidation", **numbers)], self.t)
+        gone = (1.0 - out) / 0.5
+        early = (self.t > 0.02) & (self.t < 0.2)  # time factor T = 4 rate t/π², U = 2 √(T/π)
+        assert_allclose(gone[early], 2 * np.sqrt(4 * 2.0 * self.t[early] / math.pi**3), atol=0.01)
+        late = (self.t > 0.5) & (self.t < 3)
+        assert_allclose(1 - gone[late], 8 / math.pi**2 * np.exp(-2.0 * self.t[late]), rtol=2e-3)
+
     def test_fractional_at_one_half(self) -> None:
         """E_½(−√t) = e^t erfc(√t)."""
         numbers = {"share": 0.5, "rate": 2.0, "order": 0.5}
@@ -129,7 +139,9 @@ UP_1, DOWN_1, UP_2, DOWN_2, UP_3 = (
 
 
 class TestStressSoftening:
-    @pytest.mark.parametrize("form", ["exponential", "linear", "ogden_roxburgh", "discontinuous_damage"])
+    @pytest.mark.parametrize(
+        "form", ["exponential", "linear", "ogden_roxburgh", "discontinuous_damage", "ratio", "virgin"]
+    )
     def test_softer_below_the_deepest_and_the_same_at_every_return(self, form: str) -> None:
         force = simulate(LINEAR, [active("stress_softening", form, share=0.3, depth=0.4)], TIME, CYCLES)
         inside = slice(20, 480)
@@ -152,8 +164,13 @@ class TestStressSoftening:
             "ogden_roxburgh": 1 - share * np.vectorize(math.erf)((1 - x**2) / (1 - (1 - depth) ** 2)),
             "discontinuous_damage": np.full(x.size, 1 - share * (1 - math.exp(-1.0 / depth))),
         }
+        damage = share * -np.expm1(-x / depth)
+        factors["virgin"] = (1 - damage[-1]) / (1 - damage)
+        # by a power of x over 1 mm that has taken the share at 2 depth below that
+        factors["ratio"] = x ** (math.log(1 - share) / math.log(1 - 2 * depth))
         for form, factor in factors.items():
             more = {"growth": growth, "power": 2.0, "reach": 1.0} if form == "ogden_roxburgh" else {}
+            more = {"reach": 1.0} if form == "ratio" else more
             force = simulate(LINEAR, [active("stress_softening", form, share=share, depth=depth, **more)], TIME, CYCLES)
             assert_allclose(force[UP_2], K * x * factor, atol=1e-12)
 
@@ -254,6 +271,13 @@ class TestDamage:
         force = simulate(LINEAR, [active("damage", form, **numbers)], TIME[:501], ramp(1.0, 501, False))
         assert_allclose(1 - force[-1] / K, 1e-4, rtol=1e-3)
 
+    def test_what_stays_above_a_threshold_does_no_harm(self) -> None:
+        numbers = {"rate": 0.1, "spared": 0.4, "reach": 1.0, "dead_band": 0.0}
+        cycles = np.concatenate([ramp(0.4, 201), ramp(1.0, 501)[1:], ramp(1.0, 501)[1:]])
+        force = simulate(LINEAR, [active("damage", "threshold", **numbers)], np.arange(cycles.size) * 1e-3, cycles)
+        assert_allclose(force[200], K * 0.4, rtol=1e-12)
+        assert_allclose(force[[900, 1900]], K * np.exp(-0.1 * np.array([1, 2])), rtol=1e-9)
+
     def test_by_energy_deep_travel_counts_more(self) -> None:
         for deepest in (1.0, 2.0):
             force = simulate(
@@ -343,6 +367,26 @@ class TestSeparationAndAdhesion:
         bonded = replace(SOFT, unilateral=False)
         assert np.array_equal(simulate(bonded, [active("separation")], t, x), simulate(SOFT, [], t, x))
 
+    @pytest.mark.parametrize("also", [[], [("viscous_damping", 0.0)], [("frame_compliance", 1e-12)]], ids=str)
+    def test_a_film_bears_its_impulse_and_closes_again(self, also: list[tuple[str, float]]) -> None:
+        pad = replace(LINEAR, relaxation=Relaxation((0.5,), (2.0,)), unilateral=False)
+        others = [active(name, **{active(name).form.parameters[0].name: value}) for name, value in also]
+        cycle = np.concatenate([ramp(1.0, 201)[:-1], np.zeros(200)])
+        x, t = np.tile(cycle, 3), np.arange(3 * cycle.size) * 2e-3
+        bonded = simulate(pad, others, t, x)
+        unilateral = simulate(replace(pad, unilateral=True), others, t, x)
+        force = simulate(pad, [active("separation", "film", impulse=0.02), *others], t, x)
+        tears = int(np.flatnonzero((force == 0.0) & (unilateral == 0.0) & (x > 0.0))[0])
+        assert_allclose(force[: tears - 1], bonded[: tears - 1], atol=1e-9)
+        assert bonded[tears - 2] < -0.1
+        assert_allclose(force[tears:600], 0.0, atol=1e-9)
+        for pull in np.split(np.maximum(-force, 0.0), 3):  # each time it closes it bears as much
+            assert 2e-3 * pull.sum() == pytest.approx(0.02, rel=0.05)
+        held = simulate(pad, [active("separation", "film", impulse=1e3), *others], t, x)
+        assert_allclose(held, bonded, atol=1e-9)
+        let_go = simulate(pad, [active("separation", "film", impulse=1e-6), *others], t, x)
+        assert_allclose(let_go, unilateral, atol=2e-3)
+
     @pytest.mark.parametrize(
         ("form", "shape"),
         [
@@ -389,6 +433,22 @@ class TestSeparationAndAdhesion:
         pull = np.interp(gap, [0.0, 0.05, 0.2], [0.0, 0.3, 0.0])
         assert_allclose(force[:1000], 0.0, atol=1e-12)
         assert_allclose(force[2000:], K * np.maximum(x[2000:], 0.0) - pull, atol=1e-9)
+
+    def test_fibrils_hold_until_they_tear(self) -> None:
+        x = np.concatenate([ramp(0.5, 101), -ramp(0.3, 301)])
+        numbers = {"pull_off": 0.3, "range": 0.2, "crest": 0.2, "holds": 0.5}
+        force = simulate(LINEAR, [active("adhesion", "drawing", **numbers)], np.arange(x.size) * 1e-2, x)
+        gap = 0.3 * np.arange(301) / 300
+        wanted = 0.3 * np.interp(gap / 0.2, [0.0, 0.2, 0.6, 1.0], [0.0, 1.0, 1.0, 0.0])
+        assert_allclose(force[201:502], -wanted, atol=1e-9)
+        assert_allclose(force[502:702], 0.0, atol=1e-12)  # no bond on the way in
+
+    def test_a_neck_bears_more_the_quicker_it_is_opened(self) -> None:
+        x = np.concatenate([ramp(0.5, 101), -ramp(0.1, 101, False)])
+        for speed, factor in ((10.0, 1.0), (0.1, (0.2 / 10.1) ** 0.15)):
+            numbers = {"pull_off": 0.3, "range": 0.2, "exponent": 0.15}
+            force = simulate(LINEAR, [active("adhesion", "quick", **numbers)], np.arange(x.size) * 1e-3 / speed, x)
+            assert_allclose(force[-1], -0.3 * factor * math.sin(0.25 * math.pi), rtol=1e-9)
 
     def test_a_neck_that_snaps(self) -> None:
         x = ramp(2.0, 2001) - 1.0005
