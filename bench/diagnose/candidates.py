@@ -91,6 +91,9 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         starts, default = tuple(share * reach.span_s for share in MOVED_AT), 0.5 * reach.span_s
     elif p.name == "at_time":
         default = 0.5 * reach.span_s
+    elif p.name == "bends_at":  # a rate that is another one but for a moment at the begin is a step
+        lower, upper = 0.15 * reach.span_s, min(upper, 0.95 * reach.span_s)
+        starts, default = tuple(share * reach.span_s for share in MOVED_AT[1:]), 0.5 * reach.span_s
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm
     elif p.name == "at_force":

@@ -75,7 +75,7 @@ def quickening(dt: float, force: float, state: State, p: State) -> float:
 
 @block
 def bent(dt: float, force: float, state: State, p: State) -> float:
-    """Steady, and steady otherwise from a time on; p = (rate, share, moved_at)."""
+    """Steady, and steady otherwise from a time on; p = (rate, share, bends_at)."""
     state[0] += dt
     return force + p[0] * (min(state[0], p[2]) + p[1] * max(state[0] - p[2], 0.0))
 
@@ -146,7 +146,7 @@ EFFECT = Effect(
             parameters=(
                 _RATE,
                 Parameter("share", "1", -3.0, 3.0, 0.3, "rate after it over the rate before"),
-                Parameter("moved_at", "s", 0.0, 1e6, 30.0, "time at which it changes, from the first sample on"),
+                Parameter("bends_at", "s", 0.0, 1e6, 30.0, "time at which it changes, from the first sample on"),
             ),
             sought=False,
             blocks={"sensor": bent},

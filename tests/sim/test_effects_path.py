@@ -259,7 +259,7 @@ class TestBiasDriftHum:
         assert_allclose(turns, [0.0, 0.4 / math.pi, 0.0], atol=1e-12)
         slows = sense(active("force_drift", "hyperbolic", **numbers), np.array([0.0, 20.0, 60.0]), zero)
         assert_allclose(slows, [0.0, 0.1, 0.15], atol=1e-12)
-        bends = active("force_drift", "bent", rate=0.01, share=0.25, moved_at=20.0)
+        bends = active("force_drift", "bent", rate=0.01, share=0.25, bends_at=20.0)
         assert_allclose(sense(bends, np.array([0.0, 20.0, 40.0]), zero), [0.0, 0.2, 0.25], atol=1e-12)
         ends = sense(active("force_drift", "quickening", **numbers), np.array([0.0, 20.0, 40.0]), zero)
         assert_allclose(ends, [0.0, 0.3, 0.8], atol=1e-12)
