@@ -23,6 +23,7 @@ from .evidence import Evidence, believable, evidence_of, least_gain, penalty, un
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, extended, force_at, jacobian, mean_square, reduced, refit
+from .shapes import families
 
 Array = NDArray[np.float64]
 
@@ -354,7 +355,8 @@ class Search:
             self._whitened(path)
             first, memory = len(path.fits) == 1, self.prepared.memory
             least = least_gain(path.fits[0], memory, self.samples, self.expected, first)
-            every = [t for t in self.ranked(path.fits[-1], least=least) if believable(t.fit, self.prepared)]
+            ranked = self._inside(path, self.ranked(path.fits[-1], least=least))
+            every = [t for t in ranked if believable(t.fit, self.prepared)]
             present = {c.id for c in path.fits[-1].structure.causes}
             ranked = [t for t in every if t.id not in present]
             if not ranked:
@@ -381,6 +383,21 @@ class Search:
             if len(path.fits) > 2 and best.fit.chi2 > 1.05 * self.expected:
                 path.fits[-1] = self.exchanged(path)
         return path
+
+    def _inside(self, path: Path, ranked: list[Trial]) -> list[Trial]:
+        """With another shape of the leading family in front, where it pays and has a number at the bound of what can be
+        told: a wave that grows as long as it may can be two."""
+        if not ranked or believable(ranked[0].fit, self.prepared):
+            return ranked
+        best = ranked[0].fit
+        if not self.judge(path.fits[-1], best, path.fits[0]).pays:
+            return ranked
+        shapes = families(self.short, best, [len(best.structure.causes) - 1])[0][1:]
+        tried = [t for t in (self._trial(m.fit) for m in shapes) if believable(t.fit, self.prepared)]
+        if not tried:
+            return ranked
+        again = self._carried(min(tried, key=lambda t: t.score), ALL)
+        return sorted([again, *ranked[1:]], key=lambda t: t.score)
 
     def _whitened(self, path: Path) -> None:
         """Once little is left beside the noise, its colour goes into the cost."""
