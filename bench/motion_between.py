@@ -31,7 +31,6 @@ SLACK = 1e-3  # of the way: what a trapezoid may miss a sample by
 LEAST = 3  # samples of a move that can show it to be a trapezoid
 NEAR = 30  # samples between a move and a rest, whose first and last ones may be told late
 PAUSE = 2  # intervals that are no rest where the motion hardly slows down
-HIDDEN = 0.9  # of its time: as much of a move may be seen when its ends are lost in the noise
 GAPS = (30, 10, PAUSE)  # samples that noise can make look like a rest amid a slow move
 AGREED = 5.0  # standard deviations of χ² within which it is one
 
@@ -369,7 +368,7 @@ def _fitted(
 ) -> tuple[Array, Array, Array]:
     """Middle, speed and Σ error² of each move, by damped Gauss-Newton steps on all moves at once, (m,) each."""
     fastest = np.sqrt(acceleration * moves.way)
-    slowest = HIDDEN * moves.way / moves.duration
+    slowest = moves.way / moves.duration
     middle, speed = moves.middle.copy(), np.clip(1.02 * moves.speed, np.minimum(slowest, fastest), fastest)
     kept = np.zeros(len(middle), dtype=bool) if speed_kept is None else speed_kept
     damping = np.full(len(middle), 1e-3)

@@ -23,10 +23,11 @@ from .evidence import MOST_LEFT, SPEAKS
 from .held_out import held_out_square, later_square
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
+from .path import Path
 from .refit import Fit, extended, force_at, mean_square, onto, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
-from .search import Path, Search
+from .search import Search
 from .shapes import reshaped
 from .spread import covariance
 from .swing import Swing

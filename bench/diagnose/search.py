@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,9 @@ from .data import Data, Prepared
 from .evidence import Evidence, believable, evidence_of, least_gain, penalty, unexplained
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
+from .path import Measure, Path, Trial
 from .refit import Fit, extended, force_at, jacobian, mean_square, reduced, refit
-from .shapes import departed
+from .shapes import departed, families
 
 Array = NDArray[np.float64]
 
@@ -45,42 +46,6 @@ CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and s
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 MOST_CAUSES = 3
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
-
-
-@dataclass(frozen=True)
-class Trial:
-    """A candidate joined to a fit: the joint fit on the stand-in, and what it is worth (`score`: lower is better)."""
-
-    cause: Cause
-    fit: Fit
-    score: float
-
-    @property
-    def id(self) -> str:
-        """The effect's id."""
-        return self.cause.id
-
-
-@dataclass(frozen=True)
-class Measure:
-    """By which a χ² is judged: what noise alone leaves, the samples that say something of their own, and those that
-    say the same as one and count all the same."""
-
-    expected: float
-    effective: float
-    memory: float
-
-
-@dataclass
-class Path:
-    """Causes in the order found, with the fits along the way (`fits[0]`: none of them) and what stood beside each."""
-
-    fits: list[Fit]
-    rivals: list[list[Trial]] = field(default_factory=list)
-    tried: list[list[str]] = field(default_factory=list)
-    """Ids, best first, with those that could not be believed where they stood."""
-    measures: list[Measure] = field(default_factory=list)
-    evidence: list[Evidence] = field(default_factory=list)
 
 
 class Search:
@@ -189,7 +154,7 @@ class Search:
             return plainness(t) < plainness(ranked[0]) and more < ALIKE * gained and more < ALIKE_LEFT * beyond
 
         def plainness(t: Trial) -> tuple[int, bool]:
-            return t.fit.free, not _usual(t)
+            return t.fit.free, not t.usual
 
         plain = min((t for t in ranked[1:] if as_good(t)), key=plainness, default=None)
         return ranked if plain is None else [plain, *(t for t in ranked if t is not plain)]
@@ -260,7 +225,7 @@ class Search:
         """
         best = self._carried(trials[0], MORE)
         out = [best, *trials[1:2]]
-        usual = next((t for t in trials if _usual(t) and t is not trials[0]), None)
+        usual = next((t for t in trials if t.usual and t is not trials[0]), None)
         if usual is not None:  # from its own start: where another form has ended may be a bad one
             out.append(self._carried(usual, MORE))
         tried = {best.cause.form.name}
@@ -365,7 +330,7 @@ class Search:
             self._whitened(path)
             first, memory = len(path.fits) == 1, self.prepared.memory
             least = least_gain(path.fits[0], memory, self.samples, self.expected, first)
-            tried = self.ranked(path.fits[-1], least=least)
+            tried = self._inside(path, self.ranked(path.fits[-1], least=least))
             every = [t for t in tried if believable(t.fit, self.prepared)]
             present = {c.id for c in path.fits[-1].structure.causes}
             ranked = [t for t in every if t.id not in present]
@@ -399,6 +364,21 @@ class Search:
                     path.fits.pop()
                     break
         return path
+
+    def _inside(self, path: Path, ranked: list[Trial]) -> list[Trial]:
+        """With another shape of the leading family in front, where it pays and has a number at the bound of what can be
+        told: a wave that grows as long as it may can be two."""
+        if not ranked or believable(ranked[0].fit, self.prepared):
+            return ranked
+        best = ranked[0].fit
+        if not self.judge(path.fits[-1], best, path.fits[0]).pays:
+            return ranked
+        shapes = families(self.short, best, [len(best.structure.causes) - 1])[0][1:]
+        tried = [t for t in (self._trial(m.fit) for m in shapes) if believable(t.fit, self.prepared)]
+        if not tried:
+            return ranked
+        again = self._carried(min(tried, key=lambda t: t.score), ALL)
+        return sorted([again, *ranked[1:]], key=lambda t: t.score)
 
     def _whitened(self, path: Path) -> None:
         """Once little is left beside the noise, its colour goes into the cost."""
@@ -470,11 +450,6 @@ class Search:
         return best
 
 
-def _usual(trial: Trial) -> bool:
-    """Whether it is the first form of its family."""
-    return trial.cause.form.name == trial.cause.effect.forms[0].name
-
-
 def _worth(fit: Fit, ranked: Sequence[Sequence[Trial]], most: int) -> int:
     """How many of some families, best first, take enough to be looked at more closely."""
     gains = [fit.chi2 - trials[0].fit.chi2 for trials in ranked[:most]]
@@ -485,4 +460,4 @@ def _contenders(fit: Fit, trials: list[Trial]) -> list[Trial]:
     """Of a family the best, and, where they are not far behind, the next best and the best of its first form."""
     gained = fit.chi2 - trials[0].fit.chi2
     others = [t for t in trials[1:] if fit.chi2 - t.fit.chi2 > CLOSE * gained]
-    return [trials[0], *others[:1], *[t for t in others[1:] if _usual(t)][:1]]
+    return [trials[0], *others[:1], *[t for t in others[1:] if t.usual][:1]]

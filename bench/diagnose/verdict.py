@@ -11,9 +11,10 @@ from .data import Prepared
 from .evidence import SPEAKS, tempered, unexplained
 from .held_out import held_out_square
 from .late import LATE
+from .path import Measure, Path, Trial
 from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
-from .search import Measure, Path, Search, Trial
+from .search import Search
 
 RIVAL = 25.0  # Δχ², rescaled by what is left: less does not exclude a rival
 EXPLAINED = 0.25  # of the error: what surely named causes may leave

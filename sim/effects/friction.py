@@ -322,7 +322,7 @@ EFFECT = Effect(
             what="grows with the logarithm of the speed, as of polymers",
             parameters=(
                 _COULOMB,
-                Parameter("growth", "1", 0.0, 0.4, 0.05, "relative growth for each e-fold of speed", starts=(0.05,)),
+                Parameter("growth", "1", 0.0, 0.1, 0.05, "relative growth for each e-fold of speed", starts=(0.05,)),
                 _PRESLIDING,
             ),
             sought=False,

@@ -9,7 +9,8 @@ The factor on F^e depends on depth δ and on the deepest depth so far; loading b
   Sluys, Computational modelling of the stress-softening phenomenon of rubber-like materials under cyclic loading, Eur.
   J. Mech. A 25, 2006, 877–896). One number: `depth` only says where the share is stated.
 - `preconditioned`: the same on a pad that had been pressed to `already` before the data begin.
-- `linear`: 1 − share · min(1, (deepest − δ)/depth).
+- `linear`: 1 − share · min(1, (deepest − δ)/(2 depth)): as in `exponential`, `depth` is the mean distance at which it
+  goes.
 - `ogden_roxburgh`: 1 − share · erf((W_max − W)/(w + growth · W_max)), with energies W that go with δ^power (2: a linear
   spring), and w such that the argument is 1 at `depth` below the greatest depth of the data, `reach` (R. W. Ogden,
   D. G. Roxburgh, A pseudo-elastic model for the Mullins effect in filled rubber, Proc. R. Soc. Lond. A 455, 1999,
@@ -44,7 +45,7 @@ def linear(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (share, depth, already)."""
     here = max(depth, 0.0)
     state[0] = max(state[0], here, p[2])
-    return 1.0 - p[0] * min(1.0, (state[0] - here) / p[1])
+    return 1.0 - p[0] * min(1.0, (state[0] - here) / (2.0 * p[1]))
 
 
 @block
@@ -101,7 +102,7 @@ _DEPTH = Parameter(
     1e-3,
     100.0,
     0.5,
-    "distance below the deepest point over which it goes",
+    "distance below the deepest point at which it goes, in the mean",
     required=True,
     starts=(0.15, 0.5, 2.0),
 )

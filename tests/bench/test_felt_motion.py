@@ -49,11 +49,11 @@ def test_a_short_step_out_of_a_rest_is_motion() -> None:
 def test_a_slow_move_is_one_whatever_its_noise(seed: int) -> None:
     """A mass would feel each piece of it stop and start."""
     t = np.arange(0.0, 40.0, STEP_S)
-    x = trapezoid(t, 5.0, 1.5, 0.3, 1000.0) + sum(trapezoid(t, 18.0 + 4 * k, 0.3, 20.0, 1000.0) for k in range(5))
+    x = trapezoid(t, 5.0, 3.0, 0.6, 1000.0) + sum(trapezoid(t, 18.0 + 4 * k, 0.3, 20.0, 1000.0) for k in range(5))
     told = felt(t, x + NOISE_MM * np.random.default_rng(seed).standard_normal(t.size))
     cruising = (told.time_s > 5.1) & (told.time_s < 9.9)
     speed = np.diff(told.position_mm[cruising]) / np.diff(told.time_s[cruising])
-    assert np.abs(speed - 0.3).max() < 1e-3
+    assert np.abs(speed - 0.6).max() < 2e-3
 
 
 def test_two_moves_with_a_short_rest_between_stay_two() -> None:

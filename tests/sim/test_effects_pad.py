@@ -159,7 +159,7 @@ class TestStressSoftening:
         share, depth, growth = 0.3, 0.4, 0.5
         factors = {
             "exponential": 1 - share * (1 - np.exp(-(1.0 - x) / depth)),
-            "linear": 1 - share * np.minimum(1, (1.0 - x) / depth),
+            "linear": 1 - share * np.minimum(1, (1.0 - x) / (2 * depth)),
             # W = x²/2 of a linear spring; at the reach, 1 mm, the argument is 1 at `depth` below it
             "ogden_roxburgh": 1 - share * np.vectorize(math.erf)((1 - x**2) / (1 - (1 - depth) ** 2)),
             "discontinuous_damage": np.full(x.size, 1 - share * (1 - math.exp(-1.0 / depth))),

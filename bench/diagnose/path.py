@@ -1,0 +1,50 @@
+"""What a search has been through: candidates joined to a fit, and the path from cause to cause."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .evidence import Evidence
+from .numbers import Cause
+from .refit import Fit
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate joined to a fit: the joint fit on the stand-in, and what it is worth (`score`: lower is better)."""
+
+    cause: Cause
+    fit: Fit
+    score: float
+
+    @property
+    def id(self) -> str:
+        """The effect's id."""
+        return self.cause.id
+
+    @property
+    def usual(self) -> bool:
+        """Whether it is the first form of its family."""
+        return self.cause.form.name == self.cause.effect.forms[0].name
+
+
+@dataclass(frozen=True)
+class Measure:
+    """By which a χ² is judged: what noise alone leaves, the samples that say something of their own, and those that
+    say the same as one and count all the same."""
+
+    expected: float
+    effective: float
+    memory: float
+
+
+@dataclass
+class Path:
+    """Causes in the order found, with the fits along the way (`fits[0]`: none of them) and what stood beside each."""
+
+    fits: list[Fit]
+    rivals: list[list[Trial]] = field(default_factory=list)
+    tried: list[list[str]] = field(default_factory=list)
+    """Ids, best first, with those that could not be believed where they stood."""
+    measures: list[Measure] = field(default_factory=list)
+    evidence: list[Evidence] = field(default_factory=list)
