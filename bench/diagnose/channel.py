@@ -31,6 +31,7 @@ NEARLY = 0.95  # of a ceiling
 CEILING = 8  # samples in a row at the greatest force
 CALMED, AMID = 9, 0.3  # samples over which, and share of the usual change of slope below which, the noise has gone
 TOP, DISTINCT = 0.8, 3  # of the greatest force: where a ceiling that gives way still is; and values that it passes
+ELSEWHERE = 0.1  # of the share of calm samples near the greatest force: so many elsewhere mean no ceiling
 FEW_BESIDE = 0.05  # of the samples at a ceiling that moves: so few others as high are at it too
 WIDEST_KNEE, USUAL_KNEE = 0.5, 0.1  # of a ceiling, that a knee is wide at the most, and where the noise does not tell
 AT_LAST = 0.75  # of a knee, where it is at its end
@@ -170,7 +171,10 @@ def _yielding(force: Array) -> tuple[Mask, float | None]:
         top = float((sign * force).max())
         if top < 0.05 * float(np.ptp(force)):
             continue
-        inside = (calm & (sign * force > TOP * top)).astype(np.int8)
+        high = sign * force > TOP * top
+        if calm[~high].sum() * high.sum() > ELSEWHERE * calm[high].sum() * (~high).sum():
+            continue  # so calm is this channel wherever it rests
+        inside = (calm & high).astype(np.int8)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], inside, [0]]))).reshape(-1, 2)
         for first, last in edges.tolist():
             core = force[first:last]

@@ -21,8 +21,8 @@ from .noise import Part
 Array = NDArray[np.float64]
 
 LOWEST_HZ = 8.0
-MAINS_HZ, MULTIPLES = (45.0, 65.0), (1, 2, 3)
-GRIDS_HZ = (50.0, 60.0)
+GRIDS_HZ, MULTIPLES = (50.0, 60.0), (1, 2, 3)
+OFF, STEADY = 0.05, 0.003  # of its frequency, by which a grid may be off, and by which a large one is
 LEVEL = 1e-5  # of a line by chance, over all frequencies
 LEAST_SHARE = 0.002  # of the noise power
 TOLD = 15.0  # times the noise power per sample: what a further number of the line must take
@@ -51,10 +51,9 @@ class Line:
 
     @property
     def of_the_mains(self) -> bool:
-        """Whether the grid's frequency, or a low multiple of it, looks like this at this rate of sampling."""
-        rate, step = 1.0 / self.sample_s, _grid_Hz()[1] - _grid_Hz()[0]
-        apart = np.abs(_folded(_grid_Hz(), rate) - _folded(self.frequency_Hz, rate))
-        return bool(np.min(apart) <= 2.0 * step)
+        """Whether a grid's frequency, or a low multiple of it, looks like this at this rate of sampling."""
+        rate = 1.0 / self.sample_s
+        return bool(_of_grids(float(_folded(self.frequency_Hz, rate)), rate))
 
     def force_N(self, time_s: Array, load_N: Array) -> Array:
         """The line at times (n,) since its start, under loads (n,)."""
@@ -71,11 +70,6 @@ class Line:
         others = [(3, self.ratio, self.third_phase_rad), *self.higher]
         wave = np.sin(first) + sum(ratio * np.sin(order * angle + phase) for order, ratio, phase in others if ratio)
         return np.asarray(swells * wave)
-
-
-def _grid_Hz() -> Array:
-    """Frequencies that a grid may have, and their low multiples."""
-    return np.outer(MULTIPLES, np.linspace(*MAINS_HZ, 401)).ravel()
 
 
 def _folded(frequency_Hz: Array | float, rate_Hz: float) -> Array:
@@ -216,18 +210,19 @@ def _step(stamp_s: Array) -> float:
     return float(np.mean(steps[steps < 1.5 * np.median(steps)]))
 
 
+def _of_grids(seen_Hz: float, rate_Hz: float) -> dict[float, float]:
+    """Frequencies of the mains that look like this one, and how far off a grid's they are, as a share. Folded, any
+    frequency is near one that a grid might have: there it must be one that a large grid has."""
+    count = int(MULTIPLES[-1] * max(GRIDS_HZ) / rate_Hz) + 2
+    every = [abs(k * rate_Hz + sign * seen_Hz) for k in range(count) for sign in (1.0, -1.0)]
+    far = {f: min(abs(f / (n * grid) - 1.0) for n in MULTIPLES for grid in GRIDS_HZ) for f in every}
+    return {f: off for f, off in far.items() if off <= (OFF if f <= 0.5 * rate_Hz else STEADY)}
+
+
 def _unfolded(seen_Hz: float, rate_Hz: float) -> list[float]:
     """Frequencies of the mains that look like this one, nearest to a grid's first; itself, where there are none."""
-    highest = MULTIPLES[-1] * MAINS_HZ[1]
-    every = [abs(k * rate_Hz + sign * seen_Hz) for k in range(int(highest / rate_Hz) + 2) for sign in (1.0, -1.0)]
-    far = {f: off for f in every if (off := _off_grid(f)) is not None}
-    return sorted(far, key=lambda f: far[f]) or [seen_Hz]
-
-
-def _off_grid(frequency_Hz: float) -> float | None:
-    """How far a frequency is from what grids have or its low multiples, as a share; None: it is none of theirs."""
-    of = [frequency_Hz / multiple for multiple in MULTIPLES]
-    return min((abs(f / grid - 1.0) for f in of if MAINS_HZ[0] <= f <= MAINS_HZ[1] for grid in GRIDS_HZ), default=None)
+    found = _of_grids(seen_Hz, rate_Hz)
+    return sorted(found, key=lambda f: found[f]) or [seen_Hz]
 
 
 def _told(t: Array, e: Array, candidates: Sequence[float], spacing: float, least: float) -> float:

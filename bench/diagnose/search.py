@@ -44,6 +44,7 @@ ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexp
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
 CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
+HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 MOST_CAUSES = 3
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
 
@@ -366,8 +367,8 @@ class Search:
         return path
 
     def _inside(self, path: Path, ranked: list[Trial]) -> list[Trial]:
-        """With another shape of the leading family in front, where it pays and has a number at the bound of what can be
-        told: a wave that grows as long as it may can be two."""
+        """With another shape of the leading family in front, where that one pays, has a number at the bound of what can
+        be told, and leaves much that the other does not: a wave that grows as long as it may can be two."""
         if not ranked or believable(ranked[0].fit, self.prepared):
             return ranked
         best = ranked[0].fit
@@ -378,6 +379,8 @@ class Search:
         if not tried:
             return ranked
         again = self._carried(min(tried, key=lambda t: t.score), ALL)
+        if again.fit.chi2 - self.expected > HALF * (best.chi2 - self.expected):
+            return ranked
         return sorted([again, *ranked[1:]], key=lambda t: t.score)
 
     def _whitened(self, path: Path) -> None:

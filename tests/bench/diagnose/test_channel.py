@@ -146,6 +146,18 @@ def test_the_tail_of_heavy_noise_is_no_fault():
     assert flagged <= 1
 
 
+def test_a_channel_that_is_quiet_wherever_it_rests_has_no_ceiling():
+    """Loud in its moves and quiet in all of its holds, the highest too."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        pieces, here = [], 0.0
+        for there in [*rng.uniform(0.5, 5.5, 30), 6.0, 3.0]:
+            moves = np.linspace(here, there, 60) + 0.05 * rng.standard_normal(60)
+            rests = there - 0.02 * np.linspace(0.0, 1.0, 60) + 5e-4 * rng.standard_normal(60)
+            pieces, here = [*pieces, moves, rests], there
+        assert not faults(np.concatenate(pieces)).saturated.any()
+
+
 def test_what_is_left_below_a_ceiling_is_not_the_lower_half_of_its_noise():
     """Holds close below a ceiling: which samples count must not go by their own noise."""
     for seed in SEEDS:
@@ -176,6 +188,8 @@ def test_samples_beyond_a_limit_that_was_fitted_are_told():
     (50.0, 0.001, True), (60.02, 0.001, True), (100.0, 0.002, True), (150.0, 0.001, True),
     (8.0, 0.001, False), (23.0, 0.001, False), (75.0, 0.001, False),
     (40.0, 0.01, True),  # 60 Hz at 100 samples a second
+    (9.95, 0.02, True),  # 59.95 Hz at 50
+    (45.2, 0.005, False), (24.6, 0.02, False),  # of 124.6 Hz at the nearest: no large grid is so far off
 ])  # fmt: skip
 def test_a_line_is_of_the_mains_by_its_frequency_alone(frequency_Hz, sample_s, mains):
     line = hum.Line(frequency_Hz, 0.01, 0.0, 0.0, 0.0, sample_s)
