@@ -108,7 +108,7 @@ def departed(fit: Fit, index: int) -> bool:
     at = fit.structure.of_cause(index)
     departures = [p.default == 0.0 and p.lower == -p.upper for p in fit.structure.causes[index].fitted]
     x, lower, upper = fit.x[at], fit.structure.lower[at], fit.structure.upper[at]
-    return bool(np.any(np.array(departures) & ((x <= lower + EDGE) | (x >= upper - EDGE))))
+    return bool(np.any(np.array(departures, dtype=bool) & ((x <= lower + EDGE) | (x >= upper - EDGE))))
 
 
 def _comparable(one: Form, other: Form) -> bool:

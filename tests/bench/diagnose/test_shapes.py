@@ -84,3 +84,10 @@ def test_a_shape_as_far_from_its_family_as_can_be_is_another_causes() -> None:
         x = fit.x.copy()
         x[share] = fit.structure.coordinates[share].x(value)
         assert departed(replace(fit, x=x), 0) is far
+
+
+@pytest.mark.parametrize("led", ["unilateral", "film"])
+def test_a_shape_without_numbers_of_its_own_has_none_at_a_bound(led):
+    c, p, fit = fitted("separation", "clean", led)
+    assert not departed(fit, 0)
+    assert reshaped(p.short, fit).structure.causes[0].id == "separation"
