@@ -252,6 +252,12 @@ def _trapezoids(
     starts, ends = _levels(x, moving, rest)
     if resting is not None:
         starts, ends = _of_rests(x, resting, rest, starts, ends, 4 * noise)
+    # within the noise a rest may be at the level of the one before, or lie the other way
+    on = (ends - starts) * np.array([x[last] - x[first] for first, last in rest]) > 0.0
+    if not on.any():
+        return {}
+    rest, starts, ends = [g for g, goes in zip(rest, on, strict=True) if goes], starts[on], ends[on]
+    noise = noise[on] if isinstance(noise, np.ndarray) else noise
     moves = _moves(t, x, rest, starts, ends, x if fitted is None else fitted, most)
     allowed = np.maximum(4 * noise, SLACK * moves.way)
     told = moves.count >= 2

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.felt_motion import felt
-from bench.motion_between import _carried_on
+from bench.motion_between import _carried_on, _trapezoids
 
 Array = NDArray[np.float64]
 
@@ -79,3 +79,12 @@ def test_a_move_is_not_cut_where_it_hardly_slows_down(steps: list[float], pauses
     for sign in (1.0, -1.0):
         moving = _carried_on(np.abs(np.diff(position)) > 6.0, sign * position)
         assert np.flatnonzero(~moving).tolist() == pauses
+
+
+def test_a_step_within_the_noise_between_rests_of_one_level_is_no_move():
+    """Three samples that rise by 0.1 µm each, and the next rest is where the last one was."""
+    time, x = np.arange(60) * 0.01, np.zeros(60)
+    x[21:24] = [1e-4, 2e-4, 3e-4]
+    moving, resting = np.zeros(59, dtype=bool), np.zeros(60, dtype=bool)
+    moving[20:23], resting[:20], resting[24:] = True, True, True
+    assert _trapezoids(time, x, moving, [(20, 23)], 1.0, 1e-4, x, resting=resting) == {}
