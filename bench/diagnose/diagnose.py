@@ -206,14 +206,15 @@ def _asked_again(
     """
     fit, full, at = path.fits[-1], prepared.full, prepared.at
     unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
+    suspect = flags.outlier | unsure
     errors = np.full(len(m.force_N), np.nan)
     errors[prepared.kept] = (full.force_N - force_at(full, fit.structure, fit.x))[at]
     known = np.isfinite(errors) & ~flags.by_itself
-    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, flags.outlier | unsure)
+    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect)
     if np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
-    further = outlier & ~(flags.outlier | unsure)
-    rest, few = known & ~(flags.outlier | unsure), STRAYS * len(holds(m.position_time_s, m.position_mm))
+    further, rest = outlier & ~suspect, known & ~suspect
+    few = STRAYS * len(holds(m.position_time_s, m.position_mm))
     if (flags.outlier.any() and further.sum() <= few) or strays(m, errors, further | unsure):
         rest &= ~further
     near = (NEAR * prepared.floor_N) ** 2

@@ -147,9 +147,8 @@ def _packed(values: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def _all_hung(values: Mapping[str, float]) -> tuple[float, ...]:
-    return _packed(
-        {"share": 1.0, "window": 1e-3, **values}
-    )  # the window is of the rigid part, of which nothing is left
+    # the window is of the rigid part, of which nothing is left
+    return _packed({"share": 1.0, "window": 1e-3, **values})
 
 
 EFFECT = Effect(

@@ -77,13 +77,13 @@ def virgin(dt: float, depth: float, state: State, p: State) -> float:
     return (1.0 + p[0] * math.expm1(-state[0] / p[1])) / (1.0 + p[0] * math.expm1(-here / p[1]))
 
 
+_IN_THE_PAD = 0.8  # of the reach: where the share is stated at the most
+
+
 def _exponent(values: Mapping[str, float]) -> tuple[float, ...]:
     """What `ratio` reads."""
     left = 1.0 - min(2.0 * values["depth"] / values["reach"], _IN_THE_PAD)
     return (math.log1p(-values["share"]) / math.log(left), values["already"])
-
-
-_IN_THE_PAD = 0.8
 
 
 @block
