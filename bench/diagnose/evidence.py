@@ -23,7 +23,7 @@ SHARE = 0.008  # of what all causes take together: what a further cause must tak
 
 @dataclass(frozen=True)
 class Evidence:
-    """A step from one fit to the next: Δχ², and what the noise's colour leaves of it."""
+    """A step from one fit to the next: Δχ², and what the noise's colour and what is left besides make of it."""
 
     delta_chi2: float
     effective: float
@@ -63,14 +63,18 @@ def least_gain(base: Fit, memory: float, samples: float, expected: float, first:
 
 def evidence_of(before: Fit, after: Fit, base: Fit, memory: float, samples: float, expected: float) -> Evidence:
     """What the step from `before` to `after` is worth; `memory`: samples that say the same as one, which χ² does not
-    know of; `expected`: χ² that noise alone leaves."""
+    know of; `expected`: χ² that noise alone leaves.
+
+    What is left besides, of whatever cause, counts as noise where significance is asked (Fisher's ratio of variances).
+    """
     delta = before.chi2 - after.chi2
+    misfit = max(after.chi2 / max(expected - after.free, 1.0), 1.0)
     freedom = max(after.free - before.free, 1)
     excess = max(base.chi2 - expected, 1e-9)
     left = max(before.chi2 - expected, delta, 1e-9)
     return Evidence(
         delta_chi2=delta,
-        effective=delta / memory,
+        effective=delta / (memory * misfit),
         freedom=freedom,
         threshold=threshold(freedom),
         share=delta / max(excess, delta),
