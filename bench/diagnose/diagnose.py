@@ -221,8 +221,9 @@ def _asked_again(
     if not rest.any() or float(np.mean(errors[rest] ** 2)) > near:
         return prepared, flags, search, path  # against a wrong model transients look like outliers
     flags = replace(flags, outlier=outlier, unsure=None)
-    beside = known & ~outlier & ~resting(m)
-    if not beside.any() or float(np.mean(errors[beside] ** 2)) > near:
+    moving = known & ~resting(m)
+    beside = moving & ~outlier
+    if not beside.any() or float(np.mean(errors[beside] ** 2)) > near or not strays(m, errors, outlier & moving):
         flags = not_of_the_motion(m, flags)
     anew = prepare(m, flags.good)
     prepared = anew.white() if prepared.memory == 1.0 else anew
