@@ -49,6 +49,7 @@ DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
 FALSE_SHARE, SEVERAL = 0.02, 10  # of values beyond the limit that may be noise, where at least so many lie there
 AROUND_S = 0.02  # either side of a sample, where its speed and acceleration are looked at
 TOGETHER, ONE_WAY = 0.5, 0.5  # of strays, that have another beside them, or go with the motion: fewer do
+MOSTLY = 0.5  # of the samples that stand off
 RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data; or chance of repeats
 
 
@@ -103,6 +104,8 @@ def faults(force_N: Array) -> Faults:
     if not stuck.any():
         stuck = halted
     outlier = _spikes(force_N, ~(saturated | stuck))
+    if limit is not None:  # nothing is read beyond a ceiling
+        outlier |= (force_N * np.sign(limit) > abs(limit) * (1.0 + 1e-9)) & ~saturated
     again = _stray_again(force_N, outlier, stuck)
     return Faults(
         saturated, stuck & ~again, outlier | again, bent & ~(stuck | outlier | again), limit,
@@ -132,22 +135,25 @@ def _runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _ceiling(force: Array) -> tuple[Mask, float | None]:
-    """Samples at the greatest (or least) value, where many in a row share it and nothing is beyond."""
+    """Samples at the greatest (or least) value, where many in a row share it and nothing is beyond but a few strays."""
     mask = np.zeros(len(force), dtype=bool)
     first, length = _runs(force)
     span = float(np.ptp(force))
-    if span == 0.0:
+    long = length >= CEILING
+    if span == 0.0 or not long.any():
         return mask, None
+    spike = _spikes(force, ~np.repeat(long, length))
     for sign in (1.0, -1.0):
-        top = float((sign * force).max())
+        top = float((sign * force[first[long]]).max())
         if abs(top) < 0.05 * span:
             continue
-        at = sign * force[first] >= top - 1e-9 * span
+        at = np.abs(sign * force[first] - top) <= 1e-9 * span
+        beyond = (sign * force > top + 1e-9 * span) & ~spike
         # Elsewhere runs are as long as resolution and noise make them: a ceiling's are of another size.
         usual = float(np.quantile(length[~at], 0.999)) if (~at).any() else 1.0
-        longest = int(length[at].max(initial=0))
-        if longest >= max(CEILING, 3.0 * usual) and int(length[at].sum()) >= CEILING:
-            mask |= sign * force >= top - 1e-9 * span
+        count = int(length[at].sum())
+        if int(length[at].max()) >= 3.0 * usual and beyond.sum() <= FEW_BESIDE * count:
+            mask[np.repeat(at, length)] = True
             return mask, sign * top
     return mask, None
 
@@ -433,6 +439,15 @@ def standing_off(residual: Array, good: Mask, suspect: Mask) -> Mask:
     reach = 3.0 * np.maximum(calm - float(np.median(calm)), 0.0)
     mask[index[_beyond(np.abs(e - middle), limits, reach)]] = True
     return mask
+
+
+def of_the_model(modelled: Array, errors: Array, off: Mask) -> Mask:
+    """Which of some samples `off` (m,) stand off by less than a spike that the model has there, where most of them do:
+    when exactly it comes is not known that well. `modelled`, `errors` (m,): the model's force and what it leaves, N."""
+    bend = np.pad(np.abs(np.diff(modelled, 2)), 2)
+    spike = np.maximum(np.maximum(bend[:-2], bend[1:-1]), bend[2:])
+    own = off & (np.abs(errors) < spike)
+    return own if own.sum() > MOSTLY * off.sum() else np.zeros(len(off), dtype=bool)
 
 
 def strays(m: Measurement, errors: Array, off: Mask) -> bool:

@@ -11,18 +11,17 @@ from bench.recording.types import Measurement
 from sim.effects import effect
 
 from .channel import Faults
-from .data import Data, Prepared
+from .data import Prepared
+from .evidence import FEWEST
 from .hum import Line
 from .numbers import Cause, cause_of
-from .refit import Fit, force_at, reduced
+from .refit import Fit
 from .result import CauseFound, Number
 from .verdict import described
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 SEEN = 0.001  # of the samples that repeat: told, whatever they add to the error
-FEWEST = 3  # stray samples that are called a fault
 
 
 def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: Array, final: Fit) -> list[CauseFound]:
@@ -77,18 +76,6 @@ def _named(id_: str, form: str, numbers: Mapping[str, Number], square: float) ->
     except KeyError:
         words = cause.what
     return CauseFound(id_, form, dict(numbers), square, 0.99, [], words, cause.check)
-
-
-def beyond_limit(data: Data, fit: Fit) -> Mask:
-    """Where on the grid (n,) the force of a fit is more than its channel reports: what is there tells of the limit, and
-    not of the pad."""
-    index = next((k for k, c in enumerate(fit.structure.causes) if c.id == "saturation"), None)
-    if index is None:
-        return np.zeros(data.size, dtype=bool)
-    limit_N = fit.structure.values(fit.x)[index]["limit"]
-    force = force_at(data, *reduced(fit, index))
-    one_sided = fit.structure.causes[index].form.name in ("upper", "stop")
-    return np.asarray((force if one_sided else np.abs(force)) > limit_N)
 
 
 def hum_cause(line: Line) -> Cause:

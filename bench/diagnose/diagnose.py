@@ -16,10 +16,10 @@ from bench.recording.types import Measurement
 from sim.model import Model
 from sim.pad import Pad
 
-from .channel import Faults, faults, not_of_the_motion, resting, standing_off, strays
-from .channel_causes import beyond_limit, by_themselves, channel_causes, hum_cause, joined
+from .channel import Faults, faults, not_of_the_motion, of_the_model, resting, standing_off, strays
+from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
-from .evidence import MOST_LEFT, SPEAKS
+from .evidence import MOST_LEFT, SPEAKS, beyond_limit
 from .held_out import held_out_square, later_square
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
@@ -207,10 +207,12 @@ def _asked_again(
     fit, full, at = path.fits[-1], prepared.full, prepared.at
     unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
     suspect = flags.outlier | unsure
-    errors = np.full(len(m.force_N), np.nan)
-    errors[prepared.kept] = (full.force_N - force_at(full, fit.structure, fit.x))[at]
+    errors, modelled = np.full(len(m.force_N), np.nan), m.force_N.copy()
+    modelled[prepared.kept] = force_at(full, fit.structure, fit.x)[at]
+    errors[prepared.kept] = full.force_N[at] - modelled[prepared.kept]
     known = np.isfinite(errors) & ~flags.by_itself
     outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect)
+    outlier &= ~of_the_model(modelled, errors, outlier)
     if np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
     further, rest = outlier & ~suspect, known & ~suspect

@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_law
 
 from sim.effects.base import Parameter
 
-from .data import Prepared
-from .refit import Fit
+from .channel import FAR
+from .data import Data, Prepared
+from .refit import Fit, force_at, reduced
+
+Mask = NDArray[np.bool_]
 
 LEVEL = 0.01  # of a false alarm over all that is tried
 TRIED = 150.0  # candidates with their starts, as independent tries
@@ -18,6 +22,7 @@ CRUMB = 0.002  # of the noise power: what is smaller is no finding
 EDGE = 1.01  # times a bound, within which a number is at it
 BEYOND = 3.0  # standard deviations of touch-off and tare, within which neither is found wrong
 MOST_LEFT, SPEAKS = 0.6, 0.01  # of what is left, and of the noise power: a cause beside a far larger one takes so much
+FEWEST = 3  # samples at fault that are called a fault
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 
 
@@ -110,6 +115,17 @@ def _inside(p: Parameter, value: float) -> bool:
     return p.lower < value < p.upper / EDGE
 
 
+def _ends(fit: Fit, prepared: Prepared) -> bool:
+    """Whether a limit shows in more than a sample or two, or in one that no noise puts there."""
+    full, at = prepared.full, prepared.at
+    beyond = beyond_limit(full, fit)[at] & (full.weight[at] > 0)
+    if np.count_nonzero(beyond) >= FEWEST:
+        return True
+    unlimited = force_at(full, *reduced(fit, len(fit.structure.causes) - 1))
+    short = np.abs(unlimited - full.force_N)[at][beyond] / full.total_N[at][beyond]
+    return bool(np.any(short > FAR))
+
+
 def believable(fit: Fit, prepared: Prepared) -> bool:
     """Whether the last cause's numbers are beyond what such data could show at all."""
     cause = fit.structure.causes[-1]
@@ -124,6 +140,8 @@ def believable(fit: Fit, prepared: Prepared) -> bool:
         name, std = doubts[cause.id]
         if abs(values[name]) < BEYOND * std:
             return False
+    if cause.id == "saturation" and not _ends(fit, prepared):
+        return False
     for p in cause.form.parameters:
         told = cause.amplitude is not None and p.required and not (p.fixed or p.amplitude)
         if told and not _inside(p, values[p.name]):
@@ -131,3 +149,15 @@ def believable(fit: Fit, prepared: Prepared) -> bool:
         if p.floor is not None and abs(values[p.name]) < p.floor[1] * limits[p.floor[0]]:
             return False
     return True
+
+
+def beyond_limit(data: Data, fit: Fit) -> Mask:
+    """Where on the grid (n,) the force of a fit is more than its channel reports: what is there tells of the limit, and
+    not of the pad."""
+    index = next((k for k, c in enumerate(fit.structure.causes) if c.id == "saturation"), None)
+    if index is None:
+        return np.zeros(data.size, dtype=bool)
+    limit_N = fit.structure.values(fit.x)[index]["limit"]
+    force = force_at(data, *reduced(fit, index))
+    one_sided = fit.structure.causes[index].form.name in ("upper", "stop")
+    return np.asarray((force if one_sided else np.abs(force)) > limit_N)

@@ -7,9 +7,10 @@ import pytest
 from scipy.signal import lfilter
 
 from bench.diagnose import hum, swing
-from bench.diagnose.channel import faults
-from bench.diagnose.channel_causes import beyond_limit, joined
+from bench.diagnose.channel import faults, of_the_model
+from bench.diagnose.channel_causes import joined
 from bench.diagnose.data import Data
+from bench.diagnose.evidence import beyond_limit
 from bench.diagnose.numbers import PadNumbers, Structure, cause_of
 from bench.diagnose.refit import Fit
 from bench.diagnose.result import CauseFound
@@ -120,6 +121,34 @@ def test_a_run_of_one_value_near_the_greatest_force_sticks_and_is_no_ceiling():
         found = faults(force)
         assert not found.saturated.any()
         assert found.stuck[top + 24 : top + 41].all()
+
+
+def test_strays_beyond_a_ceiling_do_not_hide_it():
+    """Stray samples beyond what the channel reports are strays; where it stays at one value is its ceiling."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        force = np.minimum(_steps(rng, 1e-6, 0.01), 5.0)
+        at = rng.choice(len(force), 100, replace=False)
+        force[at] += rng.uniform(1.5, 4.0, len(at))
+        found = faults(force)
+        assert found.limit_N == pytest.approx(5.0)
+        clipped = force == 5.0
+        assert np.mean(found.saturated[clipped]) > 0.95
+        assert not found.stuck[clipped].any()
+        assert np.mean(found.outlier[np.setdiff1d(at, np.flatnonzero(clipped))]) > 0.9
+
+
+def test_what_a_model_has_of_its_own_is_no_stray_and_what_a_wrong_one_has_besides_is():
+    """Of spikes that come a little early or late much is left; strays are larger than what a model makes of them."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        at = np.sort(rng.choice(np.arange(10, 1990, 10), 30, replace=False))
+        spikes, off = np.zeros(2000), np.zeros(2000, dtype=bool)
+        spikes[at], off[at] = rng.choice([-1.0, 1.0], 30), True
+        late = 0.6 * spikes * rng.choice([-1.0, 1.0], 2000)
+        assert np.array_equal(of_the_model(spikes, late, off), off)
+        assert not of_the_model(0.2 * spikes, spikes, off).any()
+        assert not of_the_model(np.linspace(0.0, 50.0, 2000), late, off).any()
 
 
 def test_a_frame_that_is_lost_twice_in_a_row_is_stray_and_not_stuck():
