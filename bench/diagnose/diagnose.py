@@ -43,6 +43,7 @@ LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and 
 # held out
 DOUBTED, LITTLE = 0.3, 0.08  # sure of a name, and of the error beyond the noise: a further cause with less is none
 NAMED, TRACE = 0.6, 0.05  # the same, of a further cause where what it and all others leave is next to nothing
+NEARLY_ALL = 0.9  # of the error beyond the noise
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
@@ -114,7 +115,12 @@ def _needless(
     later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
     if all(later <= HARM * later_square(prepared, fit) for fit in fits[:-1]):
         return None
-    rest = [later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(last + 1)]
+    # a drift that turns or ends is one, though its begin does not foretell that
+    causes = fits[-1].structure.causes[own:]
+    drifts = [c.id == "force_drift" and excess[k] - excess[k + 1] > NEARLY_ALL * scale for k, c in enumerate(causes)]
+    rest = [
+        np.inf if drifts[k] else later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(last + 1)
+    ]
     best = int(np.argmin(rest))
     return best if later > HARM * rest[best] else None
 

@@ -12,15 +12,26 @@ import pytest
 module = importlib.import_module("bench.diagnose.diagnose")
 
 
-def needless(monkeypatch: pytest.MonkeyPatch, squares: Sequence[float], left_out: Sequence[float]) -> int | None:
+def needless(
+    monkeypatch: pytest.MonkeyPatch,
+    squares: Sequence[float],
+    left_out: Sequence[float],
+    ids: Sequence[str] = ("friction", "backlash", "inertia"),
+    later: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
+) -> int | None:
     """Number of the needless cause: `squares`, with none, one … all causes; `left_out`, without each but the last.
-    The noise's own square is 1."""
+    `later`: squares of what comes later, by the number of causes. The noise's own square is 1."""
     fits: list[Any] = [
-        SimpleNamespace(structure=SimpleNamespace(causes=(None,) * k), number=k) for k in range(len(squares))
+        SimpleNamespace(structure=SimpleNamespace(causes=tuple(SimpleNamespace(id=i) for i in ids[:k])), number=k)
+        for k in range(len(squares))
     ]
     monkeypatch.setattr(module, "without", lambda prepared, fit, index: index)
     monkeypatch.setattr(module, "held_out_square", lambda prepared, index: left_out[index])
-    monkeypatch.setattr(module, "later_square", lambda prepared, fit: 1.0)
+
+    def later_square(prepared: Any, fit: Any) -> float:
+        return later[fit] if isinstance(fit, int) else later[fit.number]
+
+    monkeypatch.setattr(module, "later_square", later_square)
     prepared: Any = SimpleNamespace(floor_N=1.0, floor_square_std=0.01)
     return module._needless(prepared, fits, list(squares), [max(s - 1.0, 0.0) for s in squares], 0.0)
 
@@ -38,3 +49,9 @@ def test_one_that_the_others_have_made_needless_goes(monkeypatch):
 def test_one_that_takes_a_crumb_goes_and_one_that_takes_most_of_what_is_left_stays(monkeypatch):
     assert needless(monkeypatch, [400.0, 3.0, 2.5], []) == 1
     assert needless(monkeypatch, [400.0, 3.0, 1.1], []) is None
+
+
+def test_one_that_does_harm_later_goes_but_a_drift_may_turn(monkeypatch):
+    assert needless(monkeypatch, [400.0, 3.0], [], later=[2.0, 9.0]) == 0
+    assert needless(monkeypatch, [400.0, 3.0], [], ["force_drift"], later=[2.0, 9.0]) is None
+    assert needless(monkeypatch, [4.0, 2.0], [], ["force_drift"], later=[2.0, 9.0]) == 0
