@@ -29,6 +29,7 @@ LEAVING = 3  # samples at the end of a hold that may already move
 CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
 NEARLY = 0.95  # of a ceiling
 CEILING = 8  # samples in a row at the greatest force
+AT_TOP = 3  # samples at the greatest force, where digits are so many that no reading repeats another
 CALMED, AMID = 9, 0.3  # samples over which, and share of the usual change of slope below which, the noise has gone
 TOP, DISTINCT = 0.8, 3  # of the greatest force: where a ceiling that gives way still is; and values that it passes
 ELSEWHERE = 0.1  # of the share of calm samples near the greatest force: so many elsewhere mean no ceiling
@@ -146,10 +147,20 @@ def _ceiling(force: Array) -> tuple[Mask, float | None]:
         # Elsewhere runs are as long as resolution and noise make them: a ceiling's are of another size.
         usual = float(np.quantile(length[~at], 0.999)) if (~at).any() else 1.0
         longest = int(length[at].max(initial=0))
-        if longest >= max(CEILING, 3.0 * usual) and int(length[at].sum()) >= CEILING:
+        alone = length[~at].max(initial=0) == 1 and _tops(sign * force, top, sign * force >= top - 1e-9 * span)
+        if (longest >= max(CEILING, 3.0 * usual) and int(length[at].sum()) >= CEILING) or alone:
             mask |= sign * force >= top - 1e-9 * span
             return mask, sign * top
     return mask, None
+
+
+def _tops(force: Array, top: float, at: Mask) -> bool:
+    """Whether samples (m,) at the greatest force share one value in a channel in which no other two in a row do, with
+    forces beside them that lead there: what sticks does so anywhere, and a stray stands alone."""
+    if int(at.sum()) < AT_TOP or resolution(force) > 0.0:
+        return False
+    beside = (at[:-2] | at[2:]) & ~at[1:-1]
+    return bool(beside.any()) and float(np.median(force[1:-1][beside])) > TOP * top
 
 
 def _yielding(force: Array) -> tuple[Mask, float | None]:
