@@ -44,6 +44,8 @@ class Start:
 
     cause: Cause
     promise: float
+    anew: bool = False
+    """Whether the pad starts as it was believed: where its refit stands in the cause's place."""
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ LEAVING = 3  # samples at the end of a hold that may already move
 CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
 NEARLY = 0.95  # of a ceiling
 CEILING = 8  # samples in a row at the greatest force
+AT_TOP = 3  # samples at the greatest force, where digits are so many that no reading repeats another
 CALMED, AMID = 9, 0.3  # samples over which, and share of the usual change of slope below which, the noise has gone
 TOP, DISTINCT = 0.8, 3  # of the greatest force: where a ceiling that gives way still is; and values that it passes
 ELSEWHERE = 0.1  # of the share of calm samples near the greatest force: so many elsewhere mean no ceiling
@@ -135,27 +136,38 @@ def _runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _ceiling(force: Array) -> tuple[Mask, float | None]:
-    """Samples at the greatest (or least) value, where many in a row share it and nothing is beyond but a few strays."""
+    """Samples at the greatest (or least) value, where many in a row share it and nothing is beyond but a few strays; or
+    a few, in a channel in which no other two in a row are equal."""
     mask = np.zeros(len(force), dtype=bool)
     first, length = _runs(force)
     span = float(np.ptp(force))
-    long = length >= CEILING
-    if span == 0.0 or not long.any():
+    if span == 0.0:
         return mask, None
-    spike = _spikes(force, ~np.repeat(long, length))
+    long = length >= CEILING
+    spike = _spikes(force, ~np.repeat(long, length)) if long.any() else mask
     for sign in (1.0, -1.0):
-        top = float((sign * force[first[long]]).max())
+        top = float((sign * force[first[long]]).max()) if long.any() else float((sign * force).max())
         if abs(top) < 0.05 * span:
             continue
         at = np.abs(sign * force[first] - top) <= 1e-9 * span
         beyond = (sign * force > top + 1e-9 * span) & ~spike
+        others = length[~at] if (~at).any() else np.ones(1)
         # Elsewhere runs are as long as resolution and noise make them: a ceiling's are of another size.
-        usual = float(np.quantile(length[~at], 0.999)) if (~at).any() else 1.0
-        count = int(length[at].sum())
-        if int(length[at].max()) >= 3.0 * usual and beyond.sum() <= FEW_BESIDE * count:
-            mask[np.repeat(at, length)] = True
-            return mask, sign * top
+        ends = int(length[at].max()) >= max(CEILING, 3.0 * float(np.quantile(others, 0.999)))
+        ends = ends and beyond.sum() <= FEW_BESIDE * int(length[at].sum())
+        held = np.repeat(at, length)
+        if ends or (int(others.max()) == 1 and not beyond.any() and _tops(sign * force, top, held)):
+            return held, sign * top
     return mask, None
+
+
+def _tops(force: Array, top: float, at: Mask) -> bool:
+    """Whether samples (m,) at the greatest force share one value in a channel in which no other two in a row do, with
+    forces beside them that lead there: what sticks does so anywhere, and a stray stands alone."""
+    if int(at.sum()) < AT_TOP or resolution(force) > 0.0:
+        return False
+    beside = (at[:-2] | at[2:]) & ~at[1:-1]
+    return bool(beside.any()) and float(np.median(force[1:-1][beside])) > TOP * top
 
 
 def _yielding(force: Array) -> tuple[Mask, float | None]:

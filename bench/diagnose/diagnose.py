@@ -16,7 +16,7 @@ from bench.recording.types import Measurement
 from sim.model import Model
 from sim.pad import Pad
 
-from .channel import Faults, faults, not_of_the_motion, of_the_model, resting, standing_off, strays
+from .channel import FEW, Faults, faults, not_of_the_motion, of_the_model, resting, standing_off, strays
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS, beyond_limit
@@ -219,6 +219,8 @@ def _asked_again(
     known = np.isfinite(errors) & ~flags.by_itself
     outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect)
     outlier &= ~of_the_model(modelled, errors, outlier)
+    if outlier.sum() < FEW and not suspect.any():
+        outlier &= resting(m)  # one or two in moves, in a channel without strays, are at the motion's corners
     if np.array_equal(outlier, flags.outlier):
         return prepared, flags, search, path
     further, rest = outlier & ~suspect, known & ~suspect

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import effects
-from sim.effects import Form
+from sim.effects import Effect, Form
 
 from .candidates import CHANNEL, Reach, Signatures, Start, alike, forms, is_rich, starts
+from .dashpot import instead_of_a_mode
 from .data import Data, Prepared
 from .evidence import Evidence, believable, evidence_of, least_gain, penalty, unexplained
 from .late import LATE, as_late, lateness_s
@@ -112,6 +113,9 @@ class Search:
             for pair, found in zip(wanted, pool.map(lambda p: starts(signatures, *p), wanted), strict=True):
                 by_id.setdefault(pair[0].id, []).extend(found)
             promising = self._promising(by_id, least) if only is None else list(by_id)
+            for id_, start in self._hidden(fit, [pair for pair in wanted if pair[0].id not in promising]):
+                by_id[id_].append(start)
+                promising += [] if id_ in promising else [id_]
             self.progress(f"{len(promising)} candidates")
             believed = self._as_believed(fit)
             sieved = dict(
@@ -199,6 +203,12 @@ class Search:
         order = sorted((i for i in promise if promise[i] >= least), key=lambda i: -promise[i])
         return order[:WORTH]
 
+    def _hidden(self, fit: Fit, pairs: Sequence[tuple[Effect, Form]]) -> list[tuple[str, Start]]:
+        """Causes whose place a mode of the pad has taken, among those whose signature shows nothing."""
+        rates = self.believed.pad.pad.relaxation.rates
+        causes = [instead_of_a_mode(fit, rates, cause_of(*pair)) for pair in pairs]
+        return [(cause.id, Start(cause, np.inf, anew=True)) for cause in causes if cause is not None]
+
     def _sieved(
         self, fit: Fit, found: list[Start], signatures: Signatures, believed: tuple[Array, Array]
     ) -> list[Trial]:
@@ -211,11 +221,17 @@ class Search:
             if np.isfinite(s.promise) and seen < 2 and sum(forms_seen.values()) < STARTS:
                 forms_seen[s.cause.form.name] = seen + 1
                 chosen.append(s)
-        joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen]
+        joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen if not s.anew]
         # another law begins beside the fit and not at it: it takes more steps to tell what it is worth
         near = [t is not None and t.cause.form.amend is not None and t.fit.chi2 < NEAR * fit.chi2 for t in joined]
         tried = [self._carried(t, MORE) if close else t for t, close in zip(joined, near, strict=True) if t is not None]
         tried += self._from_believed(tried, *believed)
+        for s in chosen:
+            if s.anew:
+                structure = fit.structure.with_cause(s.cause)
+                x = structure.x(believed[0], [*fit.structure.values(fit.x), s.cause.start], fit.of_run)
+                again = self._solved(structure, x, MORE, None)
+                tried += [] if again is None else [self._falling(again)]
         return sorted(tried, key=lambda t: t.score)
 
     def _widened(

@@ -9,6 +9,8 @@ depends on depth: in the middle of what benches do, where forms agree on it, and
   F. R. E. Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42, 1975,
   440–445).
 - `with_stiffness`: coefficient · e^(a(δ − at_depth)) v, damping in proportion to a stiffness that grows exponentially.
+- `with_load`: coefficient · (e^(aδ) − 1)/(e^(a at_depth) − 1) v, damping in proportion to an elastic force that grows
+  exponentially; as Hunt and Crossley have it, λ xⁿ v with a force k xⁿ.
 - `power`: coefficient · v ((v² + v_0²)/(SPEED_MM_S² + v_0²))^((n−1)/2): shear thinning below n = 1, linear under
   v_0 = 0.05 mm/s.
 - `one_sided`: coefficient · (1 + differs · sgn v) v: more on the way in than on the way out, or less; `coefficient` is
@@ -52,6 +54,17 @@ def with_stiffness(dt: float, depth: float, state: State, p: State) -> float:
     moved = max(depth, 0.0) - max(state[0], 0.0)
     state[0] = depth
     return p[0] * math.exp(p[1] * (max(depth, 0.0) - p[2])) * moved / dt if dt > 0.0 else 0.0
+
+
+@block
+def with_load(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot that grows with the elastic force; p = (coefficient, growth, at_depth)."""
+    moved = max(depth, 0.0) - max(state[0], 0.0)
+    state[0] = depth
+    if dt <= 0.0 or depth <= 0.0:
+        return 0.0
+    share = math.expm1(p[1] * depth) / math.expm1(p[1] * p[2]) if p[1] != 0.0 else depth / p[2]
+    return float(p[0] * share * moved / dt)
 
 
 @block
@@ -118,6 +131,18 @@ EFFECT = Effect(
                 _AT_DEPTH,
             ),
             blocks={"contact": with_stiffness},
+            state=(0.0,),
+        ),
+        Form(
+            name="with_load",
+            what="in proportion to speed and to an elastic force that grows exponentially with depth",
+            parameters=(
+                _coefficient("force per speed at `at_depth`"),
+                Parameter("growth", "1/mm", -2.0, 10.0, 0.7, "exponential growth with depth", starts=(0.3, 1.0)),
+                _AT_DEPTH,
+            ),
+            sought=False,
+            blocks={"contact": with_load},
             state=(0.0,),
         ),
         Form(

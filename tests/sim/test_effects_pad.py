@@ -336,6 +336,8 @@ class TestViscousDamping:
             ("linear", {}, lambda x: 4.0),
             ("hunt_crossley", {"exponent": 1.5, "at_depth": 0.8}, lambda x: 4.0 * (x / 0.8) ** 1.5),
             ("with_stiffness", {"growth": 0.7, "at_depth": 0.8}, lambda x: 4.0 * np.exp(0.7 * (x - 0.8))),
+            ("with_load", {"growth": 0.7, "at_depth": 0.8}, lambda x: 4.0 * (np.exp(0.7 * x) - 1) / (np.exp(0.56) - 1)),
+            ("with_load", {"growth": 0.0, "at_depth": 0.8}, lambda x: 4.0 * x / 0.8),
             ("power", {"exponent": 0.5}, lambda x: 4.0 * (4.0 / 20.0) ** -0.5),
             ("one_sided", {"differs": 0.3}, lambda x: 4.0 * 1.3),
         ],
@@ -349,7 +351,7 @@ class TestViscousDamping:
         assert_allclose(force[512:], K * 1.5, rtol=1e-12)
         assert_allclose(force[:10], 0.0)
 
-    @pytest.mark.parametrize("form", ["linear", "hunt_crossley", "with_stiffness", "power", "one_sided"])
+    @pytest.mark.parametrize("form", ["linear", "hunt_crossley", "with_stiffness", "with_load", "power", "one_sided"])
     @pytest.mark.parametrize("unilateral", [True, False])
     def test_it_takes_energy_in_every_loop(self, form: str, unilateral: bool) -> None:
         t = np.arange(2001) * 1e-3

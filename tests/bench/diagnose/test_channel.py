@@ -305,3 +305,25 @@ def test_a_fault_of_the_channel_stands_where_what_it_takes_puts_it():
 
     model, channel = [cause("friction", 0.1), cause("backlash", 0.3)], [cause("stuck_samples", 0.0), cause("hum", 0.6)]
     assert [c.id for c in joined(model, channel)] == ["hum", "friction", "backlash", "stuck_samples"]
+
+
+def test_a_few_samples_at_the_very_greatest_force_are_a_ceiling_where_nothing_else_repeats():
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        force = 3.0 + np.sin(np.linspace(0.0, 60.0, 6000)) + 0.002 * rng.standard_normal(6000)
+        limit = float(np.sort(force)[-6])
+        found = faults(np.minimum(force, limit))
+        assert found.limit_N == limit
+        assert found.saturated.sum() == 6
+        assert not found.stuck.any()
+
+
+def test_where_a_channel_sticks_a_few_samples_at_the_greatest_force_are_no_ceiling():
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        force = 3.0 + np.sin(np.linspace(0.0, 60.0, 6000)) + 0.002 * rng.standard_normal(6000)
+        for at in (*rng.integers(10, 5990, 8).tolist(), int(np.argmax(force))):
+            force[at : at + 5] = force[at]
+        found = faults(force)
+        assert found.limit_N is None
+        assert found.stuck.sum() > 25
