@@ -196,3 +196,18 @@ def reduced(fit: Fit, index: int) -> tuple[Structure, Array]:
     gone = s.of_cause(index)
     x = np.delete(fit.x, np.arange(gone.start, gone.stop))
     return replace(s, causes=tuple(c for i, c in enumerate(s.causes) if i != index)), x
+
+
+def last(fit: Fit, id_: str) -> Fit:
+    """The same fit with the last of its causes of that id at the end."""
+    causes = fit.structure.causes
+    index = max(k for k, cause in enumerate(causes) if cause.id == id_)
+    if index == len(causes) - 1:
+        return fit
+    order = [*(k for k in range(len(causes)) if k != index), index]
+    structure = replace(fit.structure, causes=tuple(causes[k] for k in order))
+    n = len(structure.pad.coordinates)
+    at = [fit.structure.of_cause(k) for k in order]
+    places = np.concatenate([np.arange(n), *(np.arange(s.start, s.stop) for s in at)])
+    places = np.concatenate([places, np.arange(len(places), len(fit.x))])
+    return replace(fit, structure=structure, x=fit.x[places], matrix=fit.matrix[np.ix_(places, places)])

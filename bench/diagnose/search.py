@@ -24,7 +24,7 @@ from .evidence import Evidence, believable, evidence_of, least_gain, penalty, un
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .path import Measure, Path, Trial
-from .refit import Fit, extended, force_at, jacobian, mean_square, reduced, refit
+from .refit import Fit, extended, force_at, jacobian, last, mean_square, reduced, refit
 from .shapes import departed, families
 
 Array = NDArray[np.float64]
@@ -47,6 +47,7 @@ CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and s
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 MOST_CAUSES = 3
+RIVALS = 2  # beside the best, that are asked for their best shapes
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
 
 
@@ -353,23 +354,28 @@ class Search:
             ranked = [t for t in every if t.id not in present]
             if not ranked:
                 break
-            best = ranked[0]
+            best, base = ranked[0], path.fits[0]
             reshaped = min((t.fit.chi2 for t in every if t.id in present), default=np.inf)
             now = path.fits[-1] = self.settled(path.fits[-1], best.fit)
-            base = path.fits[0]
             found = self.judge(now, best.fit, base)
+            more = found.pays or now.chi2 > MISFIT * self.expected
+            other = now
+            if more and len(path.fits) > recurved:
+                recurved, other = len(path.fits), self.recurved(now)
+            same = other is not now and now.chi2 - other.chi2 > SAME * (now.chi2 - best.fit.chi2)
+            if found.pays or same:
+                ranked = self._in_shape(now, ranked, first, same)
+                if same and not self._alone_clean(now.chi2, ranked[0].fit.chi2, other.chi2):
+                    path.fits[-1] = other  # not a further cause, but one found of another shape
+                    continue
+            if ranked[0] is not best:
+                best = ranked[0]
+                now = path.fits[-1] = self.settled(now, best.fit)
+                found = self.judge(now, best.fit, base)
             path.rivals.append(ranked)
             path.tried.append([t.id for t in tried])
             path.measures.append(Measure(self.expected, self.effective, self.prepared.memory))
             path.evidence.append(found)
-            gained = now.chi2 - best.fit.chi2
-            more = found.pays or now.chi2 > MISFIT * self.expected
-            if more and len(path.fits) > recurved:
-                recurved, other = len(path.fits), self.recurved(now)
-                if now.chi2 - other.chi2 > SAME * gained:  # not a further cause, but one found of another shape
-                    path.fits[-1] = other
-                    del path.rivals[-1], path.tried[-1], path.measures[-1], path.evidence[-1]
-                    continue
             if self._reshaped(now.chi2, best.fit.chi2, reshaped):
                 break
             path.fits.append(best.fit)
@@ -399,6 +405,30 @@ class Search:
             return ranked
         return sorted([again, *ranked[1:]], key=lambda t: t.score)
 
+    def _in_shape(self, now: Fit, ranked: list[Trial], first: bool, anyway: bool) -> list[Trial]:
+        """The best and those near it with the causes in their best shapes, where the best leaves something that tells
+        them apart and another comes in front so, or a further cause leaves next to nothing; or `anyway`."""
+        best = ranked[0]
+        near = [t for t in ranked[1:] if now.chi2 - t.fit.chi2 > CLOSE * (now.chi2 - best.fit.chi2)][:RIVALS]
+        if not anyway and (not near or unexplained(best.fit.chi2, self.expected) <= 0.0):
+            return ranked
+        with ThreadPoolExecutor(WORKERS) as pool:
+            shaped = list(pool.map(self._shaped, [best, *near]))
+        lead = min(shaped, key=lambda t: t.score)
+        if lead.score > shaped[0].score - LATER * self.prepared.memory:
+            lead = shaped[0]
+        clean = lead.fit.chi2 - self.expected < CLEAN * max(now.chi2 - self.expected, 0.0)
+        if lead.id == best.id and not (anyway or (clean and not first)):
+            return ranked
+        asked = {t.id for t in shaped}
+        rest = [*(t for t in shaped if t is not lead), *(t for t in ranked if t.id not in asked)]
+        return [lead, *sorted(rest, key=lambda t: t.score)]
+
+    def _shaped(self, trial: Trial) -> Trial:
+        """A trial with that one of its causes in another form of which it gains most; its own cause stays the last."""
+        again = self._trial(last(self.recurved(trial.fit), trial.id))
+        return again if again.score < trial.score and believable(again.fit, self.prepared) else trial
+
     def _whitened(self, path: Path) -> None:
         """Once little is left beside the noise, its colour goes into the cost."""
         if self.prepared.memory == 1.0:
@@ -409,12 +439,13 @@ class Search:
             path.fits = [refit(self.short, f.structure, f.x, 20, 1e-8) for f in path.fits]
 
     def _reshaped(self, before: float, after: float, reshaped: float) -> bool:
-        """Whether another shape of a cause found does what a further cause did; not where that one leaves nothing, and
-        the other shape something. All are χ²."""
+        """Whether another shape of a cause found does what a further cause did. All are χ²."""
+        return before - reshaped > SAME * (before - after) and not self._alone_clean(before, after, reshaped)
+
+    def _alone_clean(self, before: float, after: float, reshaped: float) -> bool:
+        """Whether a further cause leaves nothing, and another shape of a cause found something."""
         left = max(before - self.expected, 1e-9)
-        if after - self.expected < CLEAN * left and reshaped - self.expected > UNCLEAN * left:
-            return False
-        return before - reshaped > SAME * (before - after)
+        return after - self.expected < CLEAN * left and reshaped - self.expected > UNCLEAN * left
 
     def recurved(self, now: Fit) -> Fit:
         """The fit with one of its causes in another form, also of those that only refine others; if that is better."""
@@ -433,7 +464,9 @@ class Search:
                 begun += [(without, s.cause) for s in starts(signatures, effect, form)]
                 trials = [self._joined(*start, MORE, None) for start in begun]
                 tried += [t for t in trials if t is not None]
-        fits = [self._carried(t, ALL).fit for t in sorted(tried, key=lambda t: t.score)[:2]]
+        near = [t for t in tried if not departed(t.fit, len(t.fit.structure.causes) - 1)]
+        of_a_form = {(t.id, t.cause.form.name): t for t in sorted(near, key=lambda t: -t.score)}
+        fits = [self._carried(t, ALL).fit for t in sorted(of_a_form.values(), key=lambda t: t.score)[:2]]
         others = [fit for fit in fits if not departed(fit, len(fit.structure.causes) - 1)]
         return min([now, *others], key=lambda fit: fit.chi2)
 

@@ -26,6 +26,9 @@ since the last reversal, rises with it, and is a continuous function of position
 - `logarithmic`: Prandtl's element whose slider holds F_c (1 + growth ln((v_0 + |v|)/(v_0 + 1 mm/s))), v_0 = 0.1 mm/s:
   polymers creep over what they slide on, and so bear more the quicker they go (B. J. Briscoe, D. Tabor, Friction and
   wear of polymers: the role of mechanical properties, Br. Polym. J. 10, 1978, 74–78). F_c is that at 1 mm/s.
+- `one_way`: Prandtl's element whose slider holds F_c (1 + differs) on the way in and F_c (1 − differs) on the way out,
+  as of a seal whose lip points one way (B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer, 1991: the
+  level depends on the direction). Wherever it slides, this is `coulomb` beside a bias; at the first sample it is none.
 
 State: last position, force, whether there was a position yet. A first position is rest without friction force.
 """
@@ -167,6 +170,18 @@ def logarithmic(dt: float, y: float, state: State, p: State) -> float:
     limit = p[0] * max(1.0 + p[1] * math.log((_CREEP_MM_S + speed) / (_CREEP_MM_S + 1.0)), 0.0)
     force = state[_FORCE] + moved * (p[0] / p[2])
     force = max(-limit, min(limit, force))
+    state[_FORCE] = force
+    return force
+
+
+@block
+def one_way(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element with a slider for each way; p = (coulomb, differs, presliding)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    force = state[_FORCE] + moved * (p[0] / p[2])
+    force = max(-p[0] * (1.0 - p[1]), min(p[0] * (1.0 + p[1]), force))
     state[_FORCE] = force
     return force
 
@@ -327,6 +342,27 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": logarithmic},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="one_way",
+            what="more the one way than the other",
+            parameters=(
+                _COULOMB,
+                Parameter(
+                    "differs",
+                    "1",
+                    -0.6,
+                    0.6,
+                    0.2,
+                    "what there is more of it on the way in, over the mean of both",
+                    default=0.0,
+                    starts=(-0.2, 0.2),
+                ),
+                _PRESLIDING,
+            ),
+            sought=False,
+            blocks={"probe": one_way},
             state=(0.0, 0.0, 0.0),
         ),
     ),

@@ -139,6 +139,15 @@ class TestFriction:
             plant.step(1.0, 5.0)
             assert_allclose(plant.step(0.5, 5.0 + 0.5 * speed), 0.1 * factor, rtol=1e-12)
 
+    def test_friction_that_differs_between_the_ways_is_one_beside_a_bias(self) -> None:
+        x = np.concatenate([np.linspace(0.0, 1.0, 101), np.linspace(1.0, 0.2, 81)])
+        force = simulate(AIR, [active("friction", "one_way", coulomb=0.1, differs=0.3)], np.arange(x.size) * 1e-3, x)
+        beside = simulate(
+            AIR, [active("friction", coulomb=0.1), active("force_bias", bias=0.03)], np.arange(x.size) * 1e-3, x
+        )
+        assert force[0] == 0.0
+        assert_allclose(force[1:], beside[1:], atol=1e-12)
+
     def test_load_dependent_friction_grows_with_depth(self) -> None:
         x = ramp(2.0, 2001)
         grows = active("friction", "load_dependent", coulomb=0.05, load=0.5)
@@ -146,7 +155,7 @@ class TestFriction:
         up, down = force[:2001], force[:1999:-1]
         assert_allclose((up - down)[100:1900], 2 * 0.05 * (1 + 0.5 * x[100:1900]), rtol=1e-9)
 
-    @pytest.mark.parametrize("form", ["coulomb", "presliding", "stribeck", "load_dependent"])
+    @pytest.mark.parametrize("form", ["coulomb", "presliding", "stribeck", "load_dependent", "one_way"])
     def test_a_closed_loop_takes_energy(self, form: str) -> None:
         x = np.concatenate([0.4 * np.sin(np.linspace(0, 2 * np.pi, 3001)) + 0.5] * 2)
         force = simulate(AIR, [active("friction", form)], np.arange(x.size) * 1e-3, x)

@@ -21,11 +21,15 @@ def fit(chi2: float, *ids: str) -> Any:
 
 
 class Told(Search):
-    """A search that is told what it finds: by the ids found so far, the candidates with their χ², best first."""
+    """A search that is told what it finds: by the ids found so far, the candidates with their χ², best first.
+    `shapes`: χ² in another shape, by the χ² without; a fit to which another is added has one too then."""
 
-    def __init__(self, ranks: dict[tuple[str, ...], dict[str, float]], together: Any) -> None:
+    def __init__(
+        self, ranks: dict[tuple[str, ...], dict[str, float]], together: Any, shapes: dict[float, float] | None = None
+    ) -> None:
         self.prepared: Any = SimpleNamespace(memory=1.0)
         self.samples, self.ranks, self.together, self.exchanges = NOISE, ranks, together, 0
+        self.shapes = shapes or {}
 
     @property
     def expected(self) -> float:
@@ -44,7 +48,11 @@ class Told(Search):
         return now
 
     def recurved(self, now: Any) -> Any:
-        return now
+        return fit(self.shapes.get(now.chi2, now.chi2), *(c.id for c in now.structure.causes))
+
+    def _shaped(self, trial: Any) -> Any:
+        chi2 = self.shapes.get(trial.fit.chi2, trial.fit.chi2)
+        return SimpleNamespace(id=trial.id, fit=fit(chi2, *(c.id for c in trial.fit.structure.causes)), score=chi2)
 
     def exchanged(self, path: Any) -> Any:
         self.exchanges += 1
@@ -83,6 +91,28 @@ def test_where_next_to_nothing_is_left_no_two_are_tried():
         {(): {"adhesion": 1010.0}, ("adhesion",): {"force_drift": 1005.0}}, fit(900.0, "force_drift", "cogging")
     )
     assert named(search) == ["adhesion"] and search.exchanges == 0
+
+
+@pytest.mark.parametrize(
+    ("ranks", "shapes", "first"),
+    [
+        ({"damage": 20e3, "friction": 25e3}, {25e3: 1010.0}, "friction"),
+        ({"damage": 20e3, "friction": 25e3}, {25e3: 1010.0, 20e3: 1000.0}, "damage"),  # either gains by it
+        ({"damage": 20e3, "friction": 2e6}, {2e6: 1010.0}, "damage"),  # it is far off
+        ({"damage": 1010.0, "friction": 25e3}, {25e3: 900.0}, "damage"),  # there is nothing to tell them apart by
+    ],
+)
+def test_shapes_are_asked_before_names_are(ranks, shapes, first):
+    search = Told({(): ranks}, fit(11e3, "adhesion", "cogging"), shapes)
+    assert named(search)[0] == first
+
+
+@pytest.mark.parametrize(("both", "after"), [(1010.0, ["friction", "force_bias"]), (90e3, ["friction"])])
+def test_a_further_cause_is_one_where_it_leaves_nothing_and_another_shape_of_the_first_does(both, after):
+    """Another shape of the friction takes most of what a bias takes, 180,000 to 110,000 of 95,000."""
+    ranks = {(): {"friction": 180e3}, ("friction",): {"force_bias": 95e3}}
+    search = Told(ranks, fit(both, "friction", "force_bias"), {180e3: 110e3, 95e3: both})
+    assert named(search) == after
 
 
 def squares(monkeypatch: pytest.MonkeyPatch, values: list[float]) -> list[float]:
