@@ -1,0 +1,326 @@
+"""Candidates joined to a fit, and sieved: a few steps from several starts for all of them, more for the better half, to
+the end for the best few, all on the short stand-in; what is compared at last has converged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim import effects
+from sim.effects import Effect, Form
+
+from .candidates import Reach, Signatures, Start, forms, is_rich, starts
+from .dashpot import instead_of_a_mode
+from .data import Data, Prepared
+from .evidence import penalty, unexplained
+from .late import LATE, as_late, lateness_s
+from .numbers import Cause, Structure, cause_of
+from .path import Trial
+from .refit import Fit, extended, force_at, jacobian, refit
+
+Array = NDArray[np.float64]
+
+FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
+STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
+FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the least
+HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
+AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
+NEAR = 2.0  # times χ² before: another law that is no farther off after a few steps takes more
+ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
+WORKERS = 2  # threads: the plant runs without Python's lock
+PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
+LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
+LIMIT = 24.0  # Δχ² by which one with a number at its bound must be better: it is another cause's limit
+ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexplained: so little more is none
+
+
+class Sieve:
+    """The candidates for one measurement. `progress` is told what goes on."""
+
+    def __init__(
+        self, prepared: Prepared, structure: Structure, progress: Callable[[str], None], known: Sequence[str] = ()
+    ) -> None:
+        """`known`: ids that detectors have found already."""
+        self.prepared, self.progress, self.known = prepared, progress, tuple(known)
+        self.believed = structure
+        self.samples = float(prepared.full.weight.sum())
+        full = prepared.full
+        self.reach = Reach(
+            sample_s=prepared.sample_s,
+            span_s=float(full.time_s[-1] - full.time_s[0]),
+            travel_mm=float(np.ptp(full.position_mm)),
+            depth_mm=prepared.depth_mm,
+            force_N=prepared.force_scale_N,
+            rich=structure.in_air or is_rich(full),
+        )
+
+    @property
+    def short(self) -> Data:
+        """What is searched on."""
+        return self.prepared.short
+
+    @property
+    def expected(self) -> float:
+        """What noise alone leaves of χ² on the stand-in, whose entries are means."""
+        return float(np.count_nonzero(self.short.weight > 0)) * float(np.sqrt(self.prepared.memory))
+
+    @property
+    def effective(self) -> float:
+        """Samples that say something of their own."""
+        return max(self.samples / self.prepared.memory, 20.0)
+
+    def ranked(self, fit: Fit, only: Sequence[str] | None = None, least: float = 0.0) -> list[Trial]:
+        """The candidates joined to a fit: the best form of each id, best first. `least`: Δχ² that is of any use."""
+        signatures = Signatures(self.short, fit)
+        wanted = [
+            pair
+            for pair in forms(fit.structure, fit.structure.in_air, self.reach)
+            if (only is None or pair[0].id in only) and pair[0].id not in self.known
+        ]
+        self.progress(f"signatures of {len(wanted)} shapes")
+        by_id: dict[str, list[Start]] = {}
+        family: dict[str, list[Form]] = {}
+        for effect, form in wanted:
+            family.setdefault(effect.id, []).append(form)
+        with ThreadPoolExecutor(WORKERS) as pool:
+            for pair, found in zip(wanted, pool.map(lambda p: starts(signatures, *p), wanted), strict=True):
+                by_id.setdefault(pair[0].id, []).extend(found)
+            promising = self._promising(by_id, least) if only is None else list(by_id)
+            for id_, start in self._hidden(fit, [pair for pair in wanted if pair[0].id not in promising]):
+                by_id[id_].append(start)
+                promising += [] if id_ in promising else [id_]
+            self.progress(f"{len(promising)} candidates")
+            believed = self._as_believed(fit)
+            sieved = dict(
+                zip(
+                    promising,
+                    pool.map(lambda i: self._sieved(fit, by_id[i], signatures, believed), promising),
+                    strict=True,
+                )
+            )
+            order = sorted((i for i in promising if sieved[i]), key=lambda i: sieved[i][0].score)
+            second = _worth(fit, [sieved[i] for i in order], SECOND)
+            wide = list(
+                pool.map(
+                    lambda i: self._widened(fit, sieved[i], by_id[i], family[i], signatures.jacobian), order[:second]
+                )
+            )
+            wide.sort(key=lambda trials: trials[0].score)
+            third = _worth(fit, wide, THIRD)
+            self.progress(f"closer: {', '.join(trials[0].id for trials in wide[:third])}")
+            close = [_contenders(fit, trials) for trials in wide[:third]]
+            ended = list(pool.map(lambda trials: [self._carried(t, ALL) for t in trials], close))
+            best = min((t for trials in ended for t in trials), key=lambda t: t.score, default=None)
+            if best is not None:
+                again = pool.map(lambda trials: self._relaxing_as(best, min(trials, key=lambda t: t.score)), ended)
+                ended = [[*trials, *new] for trials, new in zip(ended, again, strict=True)]
+        found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[third:]]]
+        found_all += [sieved[i][0] for i in order[second:]]
+        found_all.sort(key=lambda t: t.score)
+        return self._plainer(fit, sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score))
+
+    def _plainer(self, fit: Fit, ranked: list[Trial]) -> list[Trial]:
+        """First the one of fewest numbers, and of as many the first form of its family, where what it leaves more is
+        little beside what the best leaves too."""
+        if not ranked:
+            return ranked
+        best = ranked[0].fit
+        gained, beyond = fit.chi2 - best.chi2, unexplained(best.chi2, self.expected) + 1.0
+
+        def as_good(t: Trial) -> bool:
+            more = t.fit.chi2 - best.chi2
+            return plainness(t) < plainness(ranked[0]) and more < ALIKE * gained and more < ALIKE_LEFT * beyond
+
+        def plainness(t: Trial) -> tuple[int, bool]:
+            return t.fit.free, not t.usual
+
+        plain = min((t for t in ranked[1:] if as_good(t)), key=plainness, default=None)
+        return ranked if plain is None else [plain, *(t for t in ranked if t is not plain)]
+
+    def _relaxing_as(self, best: Trial, trial: Trial) -> list[Trial]:
+        """A trial again, from where the pad relaxes as in the best one: modes settle in many ways, most of them bad."""
+        order = best.fit.structure.pad.pad.relaxation.order
+        if trial is best or order == 0:
+            return []
+        end = len(best.fit.structure.pad.coordinates)
+        x = trial.fit.x.copy()
+        x[end - 2 * order : end] = best.fit.x[end - 2 * order : end]
+        again = self._solved(trial.fit.structure, x, MORE, None)
+        return [self._carried(again, ALL)] if again is not None and again.score < trial.score else []
+
+    def _late_alike(self, fit: Fit, ranked: list[Trial], family: dict[str, list[Form]]) -> list[Trial]:
+        """Where a delay, a lag or a stiff resonance fits best: the others again, from where they are as late as it."""
+        best = ranked[0] if ranked else None
+        late_s = 0.0 if best is None else lateness_s(best.id, best.fit.structure.values(best.fit.x)[-1])
+        if best is None or late_s <= 0.0:
+            return ranked
+        out = {t.id: t for t in ranked}
+        for id_ in [i for i in LATE if i in family and i != best.id]:
+            # with the bounds of physics: a mode beyond what the sampling resolves is late, and no more
+            own = effects.effect(id_)
+            shapes = [own.forms[0]]
+            if id_ == "sensor_lag" and unexplained(best.fit.chi2, self.expected) > 0.0:  # the usual ones are not it
+                shapes += [form for form in own.forms if not form.sought]
+            late = [cause_of(own, shape, values) for shape in shapes for values in as_late(id_, late_s)]
+            tried = [t for t in (self._joined(fit, cause, MORE, None) for cause in late) if t is not None]
+            if tried:
+                again = self._carried(min(tried, key=lambda t: t.score), ALL)
+                out[id_] = min([again, *([out[id_]] if id_ in out else [])], key=lambda t: t.score)
+        return list(out.values())
+
+    def _promising(self, by_id: dict[str, list[Start]], least: float) -> list[str]:
+        """Ids whose first-order signature takes anything worth while, and those that have none."""
+        promise = {id_: max((s.promise for s in found), default=0.0) for id_, found in by_id.items()}
+        finite = [p for p in promise.values() if np.isfinite(p)]
+        least = max(0.01 * max(finite, default=0.0), 8.0 * self.prepared.memory, FORETOLD * least)
+        order = sorted((i for i in promise if promise[i] >= least), key=lambda i: -promise[i])
+        return order[:WORTH]
+
+    def _hidden(self, fit: Fit, pairs: Sequence[tuple[Effect, Form]]) -> list[tuple[str, Start]]:
+        """Causes whose place a mode of the pad has taken, among those whose signature shows nothing."""
+        rates = self.believed.pad.pad.relaxation.rates
+        causes = [instead_of_a_mode(fit, rates, cause_of(*pair)) for pair in pairs]
+        return [(cause.id, Start(cause, np.inf, anew=True)) for cause in causes if cause is not None]
+
+    def _sieved(
+        self, fit: Fit, found: list[Start], signatures: Signatures, believed: tuple[Array, Array]
+    ) -> list[Trial]:
+        """A few steps from the most promising starts of an id, and once more with the pad as it was believed."""
+        found = sorted(found, key=lambda s: -s.promise)
+        chosen = [s for s in found if np.isinf(s.promise)]
+        forms_seen: dict[str, int] = {}
+        for s in found:
+            seen = forms_seen.get(s.cause.form.name, 0)
+            if np.isfinite(s.promise) and seen < 2 and sum(forms_seen.values()) < STARTS:
+                forms_seen[s.cause.form.name] = seen + 1
+                chosen.append(s)
+        joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen if not s.anew]
+        # another law begins beside the fit and not at it: it takes more steps to tell what it is worth
+        near = [t is not None and t.cause.form.amend is not None and t.fit.chi2 < NEAR * fit.chi2 for t in joined]
+        tried = [self._carried(t, MORE) if close else t for t, close in zip(joined, near, strict=True) if t is not None]
+        tried += self._from_believed(tried, *believed)
+        for s in chosen:
+            if s.anew:
+                structure = fit.structure.with_cause(s.cause)
+                x = structure.x(believed[0], [*fit.structure.values(fit.x), s.cause.start], fit.of_run)
+                again = self._solved(structure, x, MORE, None)
+                tried += [] if again is None else [self._falling(again)]
+        return sorted(tried, key=lambda t: t.score)
+
+    def _widened(
+        self, fit: Fit, trials: list[Trial], found: list[Start], family: list[Form], known: Array
+    ) -> list[Trial]:
+        """More steps for the best, and for the other forms of the family: each from where it ended, or from its own
+        most promising start, whichever leads further in a few steps.
+        """
+        best = self._carried(trials[0], MORE)
+        out = [best, *trials[1:2]]
+        usual = next((t for t in trials if t.usual and t is not trials[0]), None)
+        if usual is not None:  # from its own start: where another form has ended may be a bad one
+            out.append(self._carried(usual, MORE))
+        tried = {best.cause.form.name}
+        for form in family:
+            if form.name in tried or (form.amend is not None and best.cause.amplitude is None):
+                continue
+            tried.add(form.name)
+            cause = cause_of(best.cause.effect, form)
+            shared = {p.name for p in cause.fitted} & {p.name for p in best.cause.fitted}
+            values = best.fit.structure.values(best.fit.x)[-1]
+            cause = cause.with_start(**{name: values[name] for name in shared})
+            structure = fit.structure.with_cause(cause)
+            pad = best.fit.x[: len(structure.pad.coordinates)]
+            before = best.fit.structure.values(best.fit.x)[:-1]
+            x = structure.x(pad, [*before, cause.start], best.fit.of_run)
+            begun = self._solved(structure, x, FEW, None)
+            own = self._of_its_own(fit, form, trials, found, known)
+            if own is not None and (begun is None or own.score < begun.score):
+                out.append(self._falling(own))
+            elif begun is not None:
+                out.append(self._carried(begun, MORE))
+        return sorted(out, key=lambda t: t.score)
+
+    def _of_its_own(self, fit: Fit, form: Form, trials: list[Trial], found: list[Start], known: Array) -> Trial | None:
+        """A few steps of a form from its own best start, taken from the sieve if they are done; None: a poor start."""
+        done = [t for t in trials if t.cause.form.name == form.name]
+        if done:
+            return min(done, key=lambda t: t.score)
+        own = [s for s in found if s.cause.form.name == form.name and np.isfinite(s.promise)]
+        best = max(own, key=lambda s: s.promise, default=None)
+        if best is None or best.promise < AS_GOOD * max(s.promise for s in found):
+            return None
+        return self._joined(fit, best.cause, FEW, known)
+
+    def _falling(self, trial: Trial) -> Trial:
+        """More steps, and again while they take much: a form from its own start has a longer way than from another's
+        end."""
+        for _ in range(ROUNDS):
+            before, trial = trial.fit.chi2, self._carried(trial, MORE)
+            if before - trial.fit.chi2 < MUCH * before:
+                break
+        return trial
+
+    def _plainest(self, trials: list[Trial]) -> Trial:
+        """The best; or a form of fewer numbers that is as good for what there is to explain."""
+        best = trials[0]
+        for t in trials[1:]:
+            fewer = t.fit.free < best.fit.free
+            if fewer and t.fit.chi2 - best.fit.chi2 < PLAIN * self.prepared.memory:
+                best = t
+        return best
+
+    def _as_believed(self, fit: Fit) -> tuple[Array, Array]:
+        """(the pad's numbers as believed, derivatives there by them and by the causes of a fit)."""
+        pad = self.believed.pad.x()
+        x = fit.structure.x(pad, fit.structure.values(fit.x), fit.of_run)
+        return pad, jacobian(self.short, fit.structure, x)[:, : len(x) - fit.structure.tail]
+
+    def _from_believed(self, tried: Sequence[Trial], pad: Array, known: Array) -> list[Trial]:
+        """The best of some starts again, with the pad as it was believed: a refit may have run far from it."""
+        if not tried:
+            return []
+        best = min(tried, key=lambda t: t.score).fit
+        start = best.structure.x(pad, best.structure.values(best.x), best.of_run)
+        again = self._solved(best.structure, start, FEW, known)
+        return [] if again is None else [again]
+
+    def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
+        structure = fit.structure.with_cause(cause)
+        own = structure.x(fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
+        return self._solved(structure, extended(fit, own), steps, known)
+
+    def _solved(self, structure: Structure, x: Array, steps: int, known: Array | None) -> Trial | None:
+        if not np.isfinite(force_at(self.short, structure, x)).all():
+            return None
+        done = refit(self.short, structure, x, steps, 1e-6, known)
+        return self._trial(done)
+
+    def _trial(self, fit: Fit) -> Trial:
+        cause = fit.structure.causes[-1]
+        at = fit.structure.of_cause(len(fit.structure.causes) - 1)
+        x, lower, upper = fit.x[at], fit.structure.lower[at], fit.structure.upper[at]
+        edge = float(np.sum((x <= lower + 1e-9) | (x >= upper - 1e-9)))
+        unusual = 0.0 if cause.form.name == cause.effect.forms[0].name else LATER * self.prepared.memory
+        unusual += edge * LIMIT * self.prepared.memory
+        return Trial(cause, fit, fit.chi2 + self._penalty(fit) + unusual)
+
+    def _penalty(self, fit: Fit) -> float:
+        return penalty(fit.free, self.effective) * self.prepared.memory
+
+    def _carried(self, trial: Trial, steps: int) -> Trial:
+        return self._trial(refit(self.short, trial.fit.structure, trial.fit.x, steps, 1e-8))
+
+
+def _worth(fit: Fit, ranked: Sequence[Sequence[Trial]], most: int) -> int:
+    """How many of some families, best first, take enough to be looked at more closely."""
+    gains = [fit.chi2 - trials[0].fit.chi2 for trials in ranked[:most]]
+    return next((k for k, gain in enumerate(gains) if k > 1 and gain < HOPEFUL * max(gains)), len(gains))
+
+
+def _contenders(fit: Fit, trials: list[Trial]) -> list[Trial]:
+    """Of a family the best, and, where they are not far behind, the next best and the best of its first form."""
+    gained = fit.chi2 - trials[0].fit.chi2
+    others = [t for t in trials[1:] if fit.chi2 - t.fit.chi2 > CLOSE * gained]
+    return [trials[0], *others[:1], *[t for t in others[1:] if t.usual][:1]]
