@@ -127,7 +127,18 @@ def _ends(fit: Fit, prepared: Prepared) -> bool:
 
 
 def believable(fit: Fit, prepared: Prepared) -> bool:
-    """Whether the last cause's numbers are beyond what such data could show at all."""
+    """Whether the last cause's numbers are beyond what such data could show at all, and its own."""
+    return _own(fit, prepared) and not _small(fit, prepared)
+
+
+def too_small(fit: Fit, prepared: Prepared) -> bool:
+    """Whether all that speaks against the last cause is that such data could not show so little: it is not named, but
+    neither is it excluded."""
+    return _own(fit, prepared) and _small(fit, prepared)
+
+
+def _small(fit: Fit, prepared: Prepared) -> bool:
+    """Whether the last cause is less than the instruments resolve."""
     cause = fit.structure.causes[-1]
     values = fit.structure.values(fit.x)[-1]
     limits = {
@@ -139,16 +150,20 @@ def believable(fit: Fit, prepared: Prepared) -> bool:
     if cause.id in doubts:
         name, std = doubts[cause.id]
         if abs(values[name]) < BEYOND * std:
-            return False
+            return True
+    floors = [(p.name, p.floor) for p in cause.form.parameters if p.floor is not None]
+    return any(abs(values[name]) < share * limits[of] for name, (of, share) in floors)
+
+
+def _own(fit: Fit, prepared: Prepared) -> bool:
+    """Whether the last cause is clear of its bounds: there it is another's limit, as a wave longer than the data is, or
+    a pull of any reach."""
+    cause = fit.structure.causes[-1]
+    values = fit.structure.values(fit.x)[-1]
     if cause.id == "saturation" and not _ends(fit, prepared):
         return False
-    for p in cause.form.parameters:
-        told = cause.amplitude is not None and p.required and not (p.fixed or p.amplitude)
-        if told and not _inside(p, values[p.name]):
-            return False  # at its bound it is another cause's limit: a wave longer than the data, a pull of any reach
-        if p.floor is not None and abs(values[p.name]) < p.floor[1] * limits[p.floor[0]]:
-            return False
-    return True
+    told = [p for p in cause.form.parameters if p.required and not (p.fixed or p.amplitude)]
+    return cause.amplitude is None or all(_inside(p, values[p.name]) for p in told)
 
 
 def beyond_limit(data: Data, fit: Fit) -> Mask:

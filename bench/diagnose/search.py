@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .candidates import CHANNEL, Signatures, alike, forms, starts
-from .evidence import Evidence, believable, evidence_of, least_gain, unexplained
+from .evidence import Evidence, believable, evidence_of, least_gain, too_small, unexplained
 from .numbers import cause_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
@@ -73,7 +73,8 @@ class Search(Sieve):
                 best = ranked[0]
                 now = path.fits[-1] = self.settled(now, best.fit)
                 found = self.judge(now, best.fit, base)
-            path.rivals.append(ranked)
+            small = [t for t in tried if t.id not in present and too_small(t.fit, self.prepared)]
+            path.rivals.append([*ranked, *small])
             path.tried.append([t.id for t in tried])
             path.measures.append(Measure(self.expected, self.effective, self.prepared.memory))
             path.evidence.append(found)

@@ -67,6 +67,7 @@ class Told(Search):
 @pytest.fixture(autouse=True)
 def all_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "believable", lambda fit, prepared: True)
+    monkeypatch.setattr(module, "too_small", lambda fit, prepared: False)
 
 
 RANKS = {(): {"adhesion": 20e3, "cogging": 90e3}, ("adhesion",): {"force_drift": 12e3}}
@@ -91,6 +92,15 @@ def test_where_next_to_nothing_is_left_no_two_are_tried():
         {(): {"adhesion": 1010.0}, ("adhesion",): {"force_drift": 1005.0}}, fit(900.0, "force_drift", "cogging")
     )
     assert named(search) == ["adhesion"] and search.exchanges == 0
+
+
+def test_what_is_too_small_to_be_named_stands_beside_what_is(monkeypatch):
+    monkeypatch.setattr(module, "believable", lambda fit, prepared: fit.structure.causes[-1].id != "encoder_error")
+    monkeypatch.setattr(module, "too_small", lambda fit, prepared: fit.structure.causes[-1].id == "encoder_error")
+    search = Told({(): {"cogging": 1010.0, "encoder_error": 1011.0, "friction": 9e3}}, None)
+    path = search.path(fit(180e3))
+    assert [c.id for c in path.fits[-1].structure.causes] == ["cogging"]
+    assert [t.id for t in path.rivals[0]] == ["cogging", "friction", "encoder_error"]
 
 
 @pytest.mark.parametrize(
