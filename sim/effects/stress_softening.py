@@ -8,7 +8,10 @@ The factor on F^e depends on depth δ and on the deepest depth so far; loading b
 - `ratio`: (δ/deepest)^a, with an exponent a by which the share is gone at twice `depth` below `reach` (Z. Q. Guo, L. J.
   Sluys, Computational modelling of the stress-softening phenomenon of rubber-like materials under cyclic loading, Eur.
   J. Mech. A 25, 2006, 877–896). One number: `depth` only says where the share is stated.
-- `preconditioned`: the same on a pad that had been pressed to `already` before the data begin.
+- `root`: e^(−a √(deepest − δ)), with a by which the share is gone at twice `depth`: much of it close below the deepest
+  point (A. E. Zúñiga, M. F. Beatty, A new phenomenological model for stress-softening in elastomers, Z. Angew. Math.
+  Phys. 53, 2002, 794–814). One number, too.
+- `preconditioned`: as `exponential`, on a pad that had been pressed to `already` before the data begin.
 - `linear`: 1 − share · min(1, (deepest − δ)/(2 depth)): as in `exponential`, `depth` is the mean distance at which it
   goes.
 - `ogden_roxburgh`: 1 − share · erf((W_max − W)/(w + growth · W_max)), with energies W that go with δ^power (2: a linear
@@ -84,6 +87,19 @@ def _exponent(values: Mapping[str, float]) -> tuple[float, ...]:
     """What `ratio` reads."""
     left = 1.0 - min(2.0 * values["depth"] / values["reach"], _IN_THE_PAD)
     return (math.log1p(-values["share"]) / math.log(left), values["already"])
+
+
+@block
+def root(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (a in 1/√mm, already)."""
+    here = max(depth, 0.0)
+    state[0] = max(state[0], here, p[1])
+    return math.exp(-p[0] * math.sqrt(state[0] - here))
+
+
+def _steepness(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `root` reads."""
+    return (-math.log1p(-values["share"]) / math.sqrt(2.0 * values["depth"]), values["already"])
 
 
 @block
@@ -182,6 +198,31 @@ EFFECT = Effect(
             blocks={"elastic": ratio},
             state=(0.0,),
             pack=_exponent,
+        ),
+        Form(
+            name="root",
+            what="softer by the root of the distance below the deepest point",
+            parameters=(
+                Parameter(
+                    "share",
+                    "1",
+                    0.0,
+                    0.98,
+                    0.2,
+                    "share of the stiffness that is gone at twice `depth`",
+                    required=True,
+                    amplitude=True,
+                    starts=(0.2,),
+                ),
+                Parameter(
+                    "depth", "mm", 1e-3, 100.0, 0.5, "half the distance at which it is gone", required=True, fixed=True
+                ),
+                _ALREADY,
+            ),
+            sought=False,
+            blocks={"elastic": root},
+            state=(0.0,),
+            pack=_steepness,
         ),
         Form(
             name="preconditioned",

@@ -13,6 +13,9 @@ depends on depth: in the middle of what benches do, where forms agree on it, and
   exponentially; as Hunt and Crossley have it, λ xⁿ v with a force k xⁿ.
 - `power`: coefficient · v ((v² + v_0²)/(SPEED_MM_S² + v_0²))^((n−1)/2): shear thinning below n = 1, linear under
   v_0 = 0.05 mm/s.
+- `thermal`: coefficient · SPEED_MM_S asinh(v/v_0)/asinh(SPEED_MM_S/v_0), of bonds that heat breaks and load helps:
+  linear under v_0, then as its logarithm (H. Eyring, Viscosity, plasticity, and diffusion as examples of absolute
+  reaction rates, J. Chem. Phys. 4, 1936, 283–291).
 - `one_sided`: coefficient · (1 + differs · sgn v) v: more on the way in than on the way out, or less; `coefficient` is
   the mean of both.
 """
@@ -77,6 +80,16 @@ def power(dt: float, depth: float, state: State, p: State) -> float:
     speed = moved / dt
     square = (speed * speed + _SLOW * _SLOW) / (SPEED_MM_S * SPEED_MM_S + _SLOW * _SLOW)
     return float(p[0] * speed * square ** (0.5 * (p[1] - 1.0)))
+
+
+@block
+def thermal(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot of thermally broken bonds; p = (coefficient, linear_to)."""
+    moved = max(depth, 0.0) - max(state[0], 0.0)
+    state[0] = depth
+    if dt <= 0.0:
+        return 0.0
+    return p[0] * SPEED_MM_S * math.asinh(moved / dt / p[1]) / math.asinh(SPEED_MM_S / p[1])
 
 
 @block
@@ -153,6 +166,17 @@ EFFECT = Effect(
                 Parameter("exponent", "1", 0.35, 1.6, 0.6, "power of the speed", starts=(0.5, 0.7, 1.3)),
             ),
             blocks={"contact": power},
+            state=(0.0,),
+        ),
+        Form(
+            name="thermal",
+            what="in proportion to slow speeds, and to the logarithm of quick ones",
+            parameters=(
+                _coefficient("force over speed at 20 mm/s"),
+                Parameter("linear_to", "mm/s", 0.1, 200.0, 10.0, "speed to which it is linear", starts=(3.0, 15.0)),
+            ),
+            sought=False,
+            blocks={"contact": thermal},
             state=(0.0,),
         ),
         Form(

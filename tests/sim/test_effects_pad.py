@@ -140,7 +140,7 @@ UP_1, DOWN_1, UP_2, DOWN_2, UP_3 = (
 
 class TestStressSoftening:
     @pytest.mark.parametrize(
-        "form", ["exponential", "linear", "ogden_roxburgh", "discontinuous_damage", "ratio", "virgin"]
+        "form", ["exponential", "linear", "ogden_roxburgh", "discontinuous_damage", "ratio", "root", "virgin"]
     )
     def test_softer_below_the_deepest_and_the_same_at_every_return(self, form: str) -> None:
         force = simulate(LINEAR, [active("stress_softening", form, share=0.3, depth=0.4)], TIME, CYCLES)
@@ -168,6 +168,7 @@ class TestStressSoftening:
         factors["virgin"] = (1 - damage[-1]) / (1 - damage)
         # by a power of x over 1 mm that has taken the share at 2 depth below that
         factors["ratio"] = x ** (math.log(1 - share) / math.log(1 - 2 * depth))
+        factors["root"] = (1 - share) ** np.sqrt((1.0 - x) / (2 * depth))
         for form, factor in factors.items():
             more = {"growth": growth, "power": 2.0, "reach": 1.0} if form == "ogden_roxburgh" else {}
             more = {"reach": 1.0} if form == "ratio" else more
@@ -339,6 +340,8 @@ class TestViscousDamping:
             ("with_load", {"growth": 0.7, "at_depth": 0.8}, lambda x: 4.0 * (np.exp(0.7 * x) - 1) / (np.exp(0.56) - 1)),
             ("with_load", {"growth": 0.0, "at_depth": 0.8}, lambda x: 4.0 * x / 0.8),
             ("power", {"exponent": 0.5}, lambda x: 4.0 * (4.0 / 20.0) ** -0.5),
+            ("thermal", {"linear_to": 400.0}, lambda x: 4.0),
+            ("thermal", {"linear_to": 5.0}, lambda x: 20.0 * np.log(0.8 + 1.64**0.5) / np.log(4.0 + 17.0**0.5)),
             ("one_sided", {"differs": 0.3}, lambda x: 4.0 * 1.3),
         ],
     )
@@ -351,7 +354,7 @@ class TestViscousDamping:
         assert_allclose(force[512:], K * 1.5, rtol=1e-12)
         assert_allclose(force[:10], 0.0)
 
-    @pytest.mark.parametrize("form", ["linear", "hunt_crossley", "with_stiffness", "with_load", "power", "one_sided"])
+    @pytest.mark.parametrize("form", [f.name for f in effect("viscous_damping").forms])
     @pytest.mark.parametrize("unilateral", [True, False])
     def test_it_takes_energy_in_every_loop(self, form: str, unilateral: bool) -> None:
         t = np.arange(2001) * 1e-3
