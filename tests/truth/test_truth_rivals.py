@@ -21,12 +21,12 @@ PLAIN = {
 
 
 @pytest.mark.parametrize(
-    ("id", "shape"),
-    [("force_delay", "pure"), ("sensor_lag", "first_order"), ("sensor_lag", "moving_average"),
-     ("resonance", "second_order")],
+    ("id", "shape", "size"),
+    [("force_delay", "pure", 1.0), ("sensor_lag", "first_order", 1.0), ("sensor_lag", "moving_average", 1.0),
+     ("resonance", "second_order", 1.0), ("clock_skew", "stamped", 20.0)],  # in so short a run
 )  # fmt: skip
-def test_the_right_name_leaves_nothing(id, shape):
-    case = draw_case(3, (id,), 1.0, shape, rate_hz=1000.0, **PLAIN)
+def test_the_right_name_leaves_nothing(id, shape, size):
+    case = draw_case(3, (id,), size, shape, rate_hz=1000.0, **PLAIN)
     assert misfit(case).detectable and left_beside(case, id) < AS_GOOD
 
 
