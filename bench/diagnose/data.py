@@ -88,11 +88,12 @@ class Data:
 
     def whitened(self, force_N: Array) -> Array:
         """Forces (n,) in units of noise that is independent from entry to entry: what a stretch shares counts once."""
-        e = self._uncoloured(self.scale * force_N)
-        if self._modes is None:
-            return np.asarray(e)
-        stretch, u, factor = self._modes
-        return np.asarray(e - factor * np.bincount(stretch, u * e)[stretch])
+        with np.errstate(over="ignore", invalid="ignore"):  # a model may run away: no step is taken to where it does
+            e = self._uncoloured(self.scale * force_N)
+            if self._modes is None:
+                return np.asarray(e)
+            stretch, u, factor = self._modes
+            return np.asarray(e - factor * np.bincount(stretch, u * e)[stretch])
 
     def without(self, fold: int) -> Data:
         """One fold's samples out of the cost."""

@@ -76,8 +76,12 @@ def errors(data: Data, structure: Structure, x: Array) -> Array:
 
 def chi2(data: Data, structure: Structure, x: Array) -> float:
     """Σ w e²/σ², and what a moved surface costs."""
-    e = errors(data, structure, x)
-    return float(np.sum(e * e) + np.sum(structure.prior * x**2))
+    return _chi2(errors(data, structure, x), structure.prior, x)
+
+
+def _chi2(e: Array, prior: Array, x: Array) -> float:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.sum(e * e) + np.sum(prior * x**2))
 
 
 def mean_square(data: Data, structure: Structure, x: Array) -> float:
@@ -161,7 +165,7 @@ def refit(
     def left_of(x: Array) -> tuple[Array, float]:
         """(errors, whitened; χ²), as `errors` and `chi2` have them."""
         e = data.whitened(data.force_N - force_of(x))
-        return e, float(np.sum(e * e) + np.sum(prior * x**2))
+        return e, _chi2(e, prior, x)
 
     def normal(x: Array) -> tuple[float, Array, Array]:
         J = derivatives(x, force_of(x))
