@@ -124,6 +124,15 @@ _DEPTH = Parameter(
 )
 _ALREADY = Parameter("already", "mm", 0.0, 100.0, 0.0, "depth reached before the data begin", fixed=True)
 
+
+def _stated(what: str) -> tuple[Parameter, Parameter]:
+    """Share and depth of a form with one number: `depth` only says where the share is stated."""
+    return (
+        Parameter("share", "1", 0.0, 0.98, 0.2, what, required=True, amplitude=True, starts=(0.2,)),
+        Parameter("depth", "mm", 1e-3, 100.0, 0.5, "half the distance at which it is gone", required=True, fixed=True),
+    )
+
+
 EFFECT = Effect(
     id="stress_softening",
     what="Below the deepest point reached the pad is softer (Mullins).",
@@ -177,20 +186,7 @@ EFFECT = Effect(
             name="ratio",
             what="softer by a power of the depth over the deepest",
             parameters=(
-                Parameter(
-                    "share",
-                    "1",
-                    0.0,
-                    0.98,
-                    0.2,
-                    "share of the stiffness that is gone at twice `depth` below `reach`",
-                    required=True,
-                    amplitude=True,
-                    starts=(0.2,),
-                ),
-                Parameter(
-                    "depth", "mm", 1e-3, 100.0, 0.5, "half the distance at which it is gone", required=True, fixed=True
-                ),
+                *_stated("share of the stiffness that is gone at twice `depth` below `reach`"),
                 Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth below which `depth` counts", fixed=True),
                 _ALREADY,
             ),
@@ -203,20 +199,7 @@ EFFECT = Effect(
             name="root",
             what="softer by the root of the distance below the deepest point",
             parameters=(
-                Parameter(
-                    "share",
-                    "1",
-                    0.0,
-                    0.98,
-                    0.2,
-                    "share of the stiffness that is gone at twice `depth`",
-                    required=True,
-                    amplitude=True,
-                    starts=(0.2,),
-                ),
-                Parameter(
-                    "depth", "mm", 1e-3, 100.0, 0.5, "half the distance at which it is gone", required=True, fixed=True
-                ),
+                *_stated("share of the stiffness that is gone at twice `depth`"),
                 _ALREADY,
             ),
             sought=False,
