@@ -12,6 +12,7 @@ that a rival of a delay is held against a constant delay, and not against nothin
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -59,14 +60,9 @@ def _rings(t: np.ndarray, force: np.ndarray, x: np.ndarray) -> np.ndarray:
     return second_order(t, force, float(2 * damping / np.exp(x[0]) / (2 * np.pi)), float(damping))
 
 
-def _gaining(t: np.ndarray, force: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The later the longer the run lasts: x is the logarithm of how late at half of it."""
-    return np.interp(t - 2 * np.exp(x[0]) * (t - t[0]) / (t[-1] - t[0]), t, force)
-
-
-def _losing(t: np.ndarray, force: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The earlier the longer the run lasts."""
-    return np.interp(t + 2 * np.exp(x[0]) * (t - t[0]) / (t[-1] - t[0]), t, force)
+def _gaining(t: np.ndarray, force: np.ndarray, x: np.ndarray, sign: float = 1.0) -> np.ndarray:
+    """The later the longer the run lasts: x is the logarithm of how late at half of it; sign −1: the earlier."""
+    return np.interp(t - sign * 2 * np.exp(x[0]) * (t - t[0]) / (t[-1] - t[0]), t, force)
 
 
 CHANCE = ("force_delay",)
@@ -75,7 +71,7 @@ STAGES: dict[str, tuple[tuple[Stage, tuple[float, ...]], ...]] = {
     "force_delay": ((_delayed, ()),),
     "sensor_lag": ((_one_pole, ()), (_two_poles, ()), (_flattest, ()), (_mean, ())),
     "resonance": ((_rings, (0.0,)),),
-    "clock_skew": ((_gaining, ()), (_losing, ())),
+    "clock_skew": ((_gaining, ()), (partial(_gaining, sign=-1.0), ())),
 }
 """Shapes by id, and what their numbers begin with after the logarithm of how late."""
 
