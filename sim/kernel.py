@@ -94,19 +94,29 @@ def product(program: Ints, params: Doubles, state: Doubles, shift: int, place: i
     return result
 
 
-@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64)")
+@compiled(
+    "float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64, float64)"
+)
 def surface_force(
-    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, s: float, A: float, B: float
+    program: Ints,
+    params: Doubles,
+    state: Doubles,
+    shift: int,
+    dt: float,
+    since: float,
+    s: float,
+    A: float,
+    B: float,
 ) -> float:
     """Force of the pad were its surface at depth `s`: A + B F^e(s) + contact(s), all blocks on a scratch copy, which
-    stays."""
+    stays. `since`: for how long the pad has been touched in this step of `dt`."""
     inner, scratch = program[INNER], program[SCRATCH]
     for k in range(program[INNER_SIZE]):
         state[scratch + k] = state[inner + shift + k]
     aside = scratch - inner
     Fe = product(program, params, state, aside, ELASTIC, dt, s) * chain(program, params, state, aside, LAW, dt, s)
     state[scratch + FE] = Fe
-    return A + B * Fe + total(program, params, state, aside, CONTACT, dt, s)
+    return A + B * Fe + total(program, params, state, aside, CONTACT, since, s)
 
 
 @compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64)")
@@ -123,9 +133,9 @@ def free_surface(
     tolerance = _RESIDUE * max(abs(A), 0.1)
     low = max(depth, 0.0)  # nothing of the pad's changes above its surface
     s = max(state[pad + SURFACE], low)
-    f = surface_force(program, params, state, shift, dt, s, A, B)
+    f = surface_force(program, params, state, shift, dt, dt, s, A, B)
     # a surface that goes deeper: where a law falls with the depth, the probe may be on the pad
-    if f < -tolerance and s > depth and surface_force(program, params, state, shift, dt, depth, A, B) >= 0.0:
+    if f < -tolerance and s > depth and surface_force(program, params, state, shift, dt, dt, depth, A, B) >= 0.0:
         return depth
     a, f_a = s, f
     width = max(s - low, 1e-6)
@@ -135,7 +145,7 @@ def free_surface(
         a, f_a, low = s, f, s
         s += width
         width *= 2.0
-        f = surface_force(program, params, state, shift, dt, s, A, B)
+        f = surface_force(program, params, state, shift, dt, dt, s, A, B)
     if not f >= -tolerance:  # a law that falls with the depth has none: the surface stays with the probe
         return depth
     high = s
@@ -150,7 +160,7 @@ def free_surface(
             c = 0.5 * (low + high)
             stale = 0
         if not low < c:
-            if not sure and surface_force(program, params, state, shift, dt, depth, A, B) >= 0.0:
+            if not sure and surface_force(program, params, state, shift, dt, dt, depth, A, B) >= 0.0:
                 return depth
             sure = True
             c = 0.5 * (low + high)
@@ -159,7 +169,7 @@ def free_surface(
         before = high - low
         a, f_a = s, f
         s = c
-        f = surface_force(program, params, state, shift, dt, s, A, B)
+        f = surface_force(program, params, state, shift, dt, dt, s, A, B)
         if s != a:
             slope = (f - f_a) / (s - a)
         if f < 0.0:
@@ -211,6 +221,11 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
         A += c * (state[cache + 1 + i] * state[pad + W + i] - gain * old)
         B += c * gain
     surface = max(depth, 0.0)
+    since = dt
+    before = state[pad + PAD_DEPTH]
+    if before < state[pad + SURFACE] < depth and program[STARTS + FRAME] == program[STARTS + FRAME + 1]:
+        # touched within the step, at full speed; a frame between takes that up
+        since = dt * (depth - state[pad + SURFACE]) / (depth - before)
     plain = program[STARTS + CONTACT] == program[STARTS + CONTACT + 1]
     simple = plain and program[STARTS + GAP] == program[STARTS + GAP + 1]
     lasting = program[STARTS + ELASTIC] == program[STARTS + ELASTIC + 1]  # nothing remembers where the surface was
@@ -219,14 +234,14 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
     if program[UNILATERAL] != 0 and not (simple and lasting):
         # a pad that has let go is asked first where its surface is now
         held = program[FILM] != 0 and 0.0 < state[pad + PULLED] < params[program[FILM]]
-        apart = not held and depth < state[pad + SURFACE] and state[pad + PAD_DEPTH] < state[pad + SURFACE]
-        F = -1.0 if apart else surface_force(program, params, state, shift, dt, depth, A, B)
+        apart = not held and depth < state[pad + SURFACE] and before < state[pad + SURFACE]
+        F = -1.0 if apart else surface_force(program, params, state, shift, dt, since, depth, A, B)
         if F < 0.0 and not apart:
             pull = torn(program, params, state, shift, dt, F)
         if F < 0.0 and pull != F:
             surface = free_surface(program, params, state, shift, dt, depth, A, B)
             off = surface > depth
-            F = 0.0 if off else max(surface_force(program, params, state, shift, dt, depth, A, B), 0.0)
+            F = 0.0 if off else max(surface_force(program, params, state, shift, dt, since, depth, A, B), 0.0)
             surface = max(surface, 0.0)
         scratch = program[SCRATCH] - program[INNER]
         Fe = state[pad - shift + scratch + FE]
@@ -239,7 +254,7 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
         if program[UNILATERAL] != 0 and F < 0.0:
             pull = torn(program, params, state, shift, dt, F)
             off = pull != F
-        F += total(program, params, state, shift, CONTACT, dt, depth)
+        F += total(program, params, state, shift, CONTACT, since, depth)
     if off:
         if plain:
             Fe = -A / B if B > 0.0 else 0.0

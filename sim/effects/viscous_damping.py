@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
-from sim.jit import State, block
+from sim.jit import State, block, compiled
 
 SPEED_MM_S = 20.0
 """Speed at which `coefficient` is force over speed."""
@@ -33,51 +33,50 @@ _SLOW = 0.05
 """Speed below which `power` is linear, mm/s: a root has no slope at rest."""
 
 
+@compiled("float64(float64, float64, float64)")
+def _speed(dt: float, depth: float, before: float) -> float:
+    """In the pad, mm/s."""
+    return (depth - max(before, 0.0)) / dt if dt > 0.0 and depth > 0.0 else 0.0
+
+
 @block
 def linear(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot; p = (coefficient,)."""
-    moved = max(depth, 0.0) - max(state[0], 0.0)
+    speed = _speed(dt, depth, state[0])
     state[0] = depth
-    return p[0] * moved / dt if dt > 0.0 else 0.0
+    return p[0] * speed
 
 
 @block
 def hunt_crossley(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot that grows with depth; p = (coefficient, exponent, at_depth)."""
-    moved = max(depth, 0.0) - max(state[0], 0.0)
+    speed = _speed(dt, depth, state[0])
     state[0] = depth
-    if dt <= 0.0 or depth <= 0.0:
-        return 0.0
-    return float(p[0] * (depth / p[2]) ** p[1] * moved / dt)
+    return float(p[0] * (max(depth, 0.0) / p[2]) ** p[1] * speed)
 
 
 @block
 def with_stiffness(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot that grows exponentially with depth; p = (coefficient, growth, at_depth)."""
-    moved = max(depth, 0.0) - max(state[0], 0.0)
+    speed = _speed(dt, depth, state[0])
     state[0] = depth
-    return p[0] * math.exp(p[1] * (max(depth, 0.0) - p[2])) * moved / dt if dt > 0.0 else 0.0
+    return p[0] * math.exp(p[1] * (max(depth, 0.0) - p[2])) * speed
 
 
 @block
 def with_load(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot that grows with the elastic force; p = (coefficient, growth, at_depth)."""
-    moved = max(depth, 0.0) - max(state[0], 0.0)
+    speed = _speed(dt, depth, state[0])
     state[0] = depth
-    if dt <= 0.0 or depth <= 0.0:
-        return 0.0
-    share = math.expm1(p[1] * depth) / math.expm1(p[1] * p[2]) if p[1] != 0.0 else depth / p[2]
-    return float(p[0] * share * moved / dt)
+    share = math.expm1(p[1] * max(depth, 0.0)) / math.expm1(p[1] * p[2]) if p[1] != 0.0 else depth / p[2]
+    return float(p[0] * share * speed)
 
 
 @block
 def power(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot that depends on speed; p = (coefficient, exponent)."""
-    moved = max(depth, 0.0) - max(state[0], 0.0)
+    speed = _speed(dt, depth, state[0])
     state[0] = depth
-    if dt <= 0.0:
-        return 0.0
-    speed = moved / dt
     square = (speed * speed + _SLOW * _SLOW) / (SPEED_MM_S * SPEED_MM_S + _SLOW * _SLOW)
     return float(p[0] * speed * square ** (0.5 * (p[1] - 1.0)))
 
@@ -85,21 +84,17 @@ def power(dt: float, depth: float, state: State, p: State) -> float:
 @block
 def thermal(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot of thermally broken bonds; p = (coefficient, linear_to)."""
-    moved = max(depth, 0.0) - max(state[0], 0.0)
+    speed = _speed(dt, depth, state[0])
     state[0] = depth
-    if dt <= 0.0:
-        return 0.0
-    return p[0] * SPEED_MM_S * math.asinh(moved / dt / p[1]) / math.asinh(SPEED_MM_S / p[1])
+    return p[0] * SPEED_MM_S * math.asinh(speed / p[1]) / math.asinh(SPEED_MM_S / p[1])
 
 
 @block
 def one_sided(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot that differs by direction; p = (coefficient, differs)."""
-    moved = max(depth, 0.0) - max(state[0], 0.0)
+    speed = _speed(dt, depth, state[0])
     state[0] = depth
-    if dt <= 0.0:
-        return 0.0
-    return p[0] * (1.0 + p[1] if moved > 0.0 else 1.0 - p[1]) * moved / dt
+    return p[0] * (1.0 + p[1] if speed > 0.0 else 1.0 - p[1]) * speed
 
 
 def _coefficient(what: str) -> Parameter:
