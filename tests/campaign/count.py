@@ -103,6 +103,11 @@ def both_detectable(line: Line) -> bool:
     return all(line["truth"]["alone"].values())
 
 
+def least_beside(line: Line) -> float:
+    """Of a pair: χ² of the effect that is seen less beside the other (tests/truth/beside.py); nan where not asked."""
+    return float(min(line["truth"].get("beside", {}).values(), default=math.nan))
+
+
 @dataclass(frozen=True)
 class Stated:
     """One parameter of a cause named rightly: the truth, what was said, the least deviation possible."""

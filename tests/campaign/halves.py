@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tests.benchmarks.report import Table
+from tests.truth.detect import ENOUGH
 from tests.truth.effects import HALVES
 
 from .count import (
@@ -20,6 +21,7 @@ from .count import (
     causes,
     detectable,
     found,
+    least_beside,
     rate,
     right_first,
     right_listed,
@@ -27,6 +29,9 @@ from .count import (
     spurious,
 )
 from .plan import GROUPS
+
+PLAIN = 10 * ENOUGH
+"""χ² of an effect that is plain beside another."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +75,8 @@ def shaped(by: Mapping[str, Sequence[Line]]) -> list[Figure]:
     told = [line for line in single if line["truth"]["of_noise_power"] >= TOLD]
     pairs, outside = [p for p in by["pair"] if both_detectable(p)], [o for o in by["outside"] if detectable(o)]
 
+    plain = [p for p in pairs if least_beside(p) >= PLAIN]
+
     def unexplained(line: Line) -> bool:
         return bool(line["said"]["verdict"] == "unexplained")
 
@@ -91,6 +98,7 @@ def shaped(by: Mapping[str, Sequence[Line]]) -> list[Figure]:
         Figure("spurious second cause, single, detectable", 0.03, False, rate(single, spurious)),
         Figure("both of a pair named", 0.90, True, rate(pairs, both)),
         Figure("… and nothing else", None, True, rate(pairs, both_alone)),
+        Figure("… each seen beside the other, χ² ≥ 600", None, True, rate(plain, both)),
         Figure("outside the catalogue: unexplained", 0.93, True, rate(outside, unexplained)),
     ]
 

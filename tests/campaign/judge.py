@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.truth.beside import seen_beside
 from tests.truth.cases import Case, draw_case
 from tests.truth.detect import Lab, _coordinates, _pad, _sigma, _whitened, misfit, sampling
 from tests.truth.noise import Coloured, Quantised, StudentT, White
@@ -65,9 +66,10 @@ def truth_of(case: Case) -> dict[str, Any]:
     truth = case.truth
     seen = misfit(case)
     n = len(case.force_N)
-    alone = {}
+    alone, beside = {}, {}
     if len(truth.ids) > 1:
         alone = {id: bool(misfit(case.alone(id)).detectable) for id in truth.ids}
+        beside = seen_beside(case)
     return {
         "truth": {
             "parameters": truth.parameters,
@@ -88,6 +90,7 @@ def truth_of(case: Case) -> dict[str, Any]:
             "misfit_N": seen.rmse_N,
             "of_noise_power": (seen.chi2 + seen.faults) / n,
             "alone": alone,
+            "beside": beside,
             "coarse_chi2": sampling(case),
         }
     }

@@ -14,6 +14,8 @@ from .count import (
     FLAGS_GOOD,
     Line,
     Rate,
+    both_detectable,
+    causes,
     confusion,
     detectable,
     first,
@@ -21,7 +23,9 @@ from .count import (
     flags_pair,
     floor_between,
     floor_near,
+    found,
     held_out_near,
+    least_beside,
     rate,
     right_first,
     right_listed,
@@ -30,6 +34,9 @@ from .count import (
 )
 from .halves import Figure, grouped, half, shaped, side_by_side
 from .plan import CATALOGUE, GROUPS
+
+BESIDE = (0.0, 60.0, 200.0, 600.0, 2e3, 1e4, 1e5, 1e12)
+"""χ² of the lesser effect of a pair beside the other."""
 
 BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0 + 1e-9)
 """Of confidence."""
@@ -40,6 +47,7 @@ def page(lines: Sequence[Line], command: str) -> str:
     good = [line for line in lines if "error" not in line]
     by = grouped(good)
     judged = [line for line in [*by["single"], *by["large"]] if half(line) == "judge"]
+    seen = any(line["truth"].get("beside") for line in by["pair"])
     versions = len({line["code"] for line in lines})
     counts = ", ".join(f"{len(by[group])} {group}" for group in GROUPS)
     blocks = [
@@ -81,6 +89,7 @@ def page(lines: Sequence[Line], command: str) -> str:
         "",
         *by_size([*by["single"], *by["large"]]).lines(),
         "",
+        *(["## Pairs", "", *WHAT_IS_SEEN_BESIDE.strip().splitlines(), "", *by_beside(by["pair"]).lines(), ""] * seen),
         "## What was named first",
         "",
         "Rows: what was hidden. Columns: what was named, by the number of its row; C consistent, U unexplained",
@@ -118,13 +127,21 @@ WHAT_IS_COUNTED = """
   within χ² of 25 (tests/truth/rivals.py; computed for what makes the force late). *Or not excluded*: without asking
   for that.
 - *Spurious*: a cause after the first that was not hidden. *Both of a pair*: named at any place, of the pairs of which
-  each effect alone would be detectable.
+  each effect alone would be detectable. *Each seen beside the other*: of those, pairs of which neither effect can be
+  made by the pad's numbers and the other's size but for χ² of 600 (table of pairs below).
 - *Parameter*: each of the contract's parameters of a cause that was rightly named first. The bound is that of Cramér
   and Rao for the effect's size with the pad's numbers unknown.
 - *Noise floor*: the deviation of the force noise, and the same with the position's noise through the stiffness. A
   diagnosis that averages the motion comes to rest between the two.
 - *Held-out error*: single and large cases rightly named, over the noise floor as stated.
 - Intervals are Wilson's at 95 %. A target whose interval holds it is open, whatever the rate.
+"""
+
+
+WHAT_IS_SEEN_BESIDE = """
+Pairs of which each effect alone would be detectable, by the χ² that the lesser one makes beside the other: what of it
+neither the pad's numbers nor the size of the other can make, the other's shape being known (tests/truth/beside.py).
+The diagnosis does not know the shape.
 """
 
 
@@ -223,6 +240,20 @@ def by_size(lines: Sequence[Line]) -> Table:
     for name, field in (("noise", "noise"), ("protocol", "protocol"), ("law", "law"), ("contact", "contact")):
         for value in sorted({r["truth"][field] for r in lines}):
             table.rows.append(_effect_row(f"{name} {value}", [r for r in lines if r["truth"][field] == value]))
+    return table
+
+
+def by_beside(lines: Sequence[Line]) -> Table:
+    """Pairs by how much is seen of the lesser effect beside the other."""
+    table = Table(["χ² of the lesser", "n", "both named", "and nothing else", "one", "none"])
+    asked = [line for line in lines if both_detectable(line) and not math.isnan(least_beside(line))]
+    for low, high in zip(BESIDE, BESIDE[1:], strict=False):
+        own = [line for line in asked if low <= least_beside(line) < high]
+        hits = [sum(found(line, id) for id in line["item"]["ids"]) for line in own]
+        alone = sum(sorted(causes(line)) == sorted(line["item"]["ids"]) for line in own)
+        if own:
+            cells = (len(own), hits.count(2), alone, hits.count(1), hits.count(0))
+            table.rows.append([f"{low:g}–{high:g}", *map(str, cells)])
     return table
 
 

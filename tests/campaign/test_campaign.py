@@ -11,7 +11,7 @@ from tests.truth.cases import draw_case
 from tests.truth.effects import EFFECTS
 
 from .__main__ import read
-from .count import Rate, right_listed, right_or_alike, spurious, stated, wrongs
+from .count import Rate, least_beside, right_listed, right_or_alike, spurious, stated, wrongs
 from .halves import half as half_of
 from .judge import bounds, score_flags, truth_of
 from .plan import CATALOGUE, Item, plan
@@ -193,3 +193,20 @@ def test_the_page_has_the_halves_side_by_side():
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells[1:] == ["≥ 97 %", "50.0 %", "9.5–90.5 %", "2", "no", "100.0 %", "20.7–100.0 %", "1", "yes, open"]
     assert "## By effect, judge half" in text and "friction, b (judge)" in text and "friction, a (judge)" not in text
+
+
+def test_pairs_go_by_what_is_seen_of_the_lesser():
+    hidden = ("friction", "backlash")
+    seen = [{"friction": 9e4, "backlash": least} for least in (50.0, 700.0, 800.0)]
+    both = [GOOD, ("backlash", 0.1, 0.1, ())]
+    lines = [line(said, hidden, "pair") for said in ([GOOD], both, [GOOD])]
+    for own, beside in zip(lines, seen, strict=True):
+        own["truth"] |= {"beside": beside}
+    assert [least_beside(own) for own in lines] == [50.0, 700.0, 800.0]
+    text = page(lines, "command")
+    table = text[text.index("## Pairs") : text.index("## What was named first")]
+    rows = [[cell.strip() for cell in row.strip("|").split("|")] for row in table.splitlines() if row.startswith("|")]
+    assert rows[2:] == [["0–60", "1", "0", "0", "1", "0"], ["600–2000", "2", "1", "1", "1", "0"]]
+    target = next(row for row in text.splitlines() if row.startswith("| … each seen beside the other"))
+    assert [cell.strip() for cell in target.strip("|").split("|")][2:5] == ["50.0 %", "9.5–90.5 %", "2"]
+    assert "## Pairs" not in page([line([GOOD])], "command")

@@ -360,7 +360,9 @@ class TestViscousDamping:
         damper = active("viscous_damping", coefficient=0.05)
         for first in np.linspace(-0.0299, -0.0001, 7):  # of the last sample before the surface
             x = first + speed * 1e-3 * np.arange(-4, 6)
-            force = simulate(pad, [damper], np.arange(x.size) * 1e-3, x) - simulate(pad, [], np.arange(x.size) * 1e-3, x)
+            force = simulate(pad, [damper], np.arange(x.size) * 1e-3, x) - simulate(
+                pad, [], np.arange(x.size) * 1e-3, x
+            )
             assert_allclose(force, np.where(x > 0.0, 0.05 * speed, 0.0), rtol=1e-9)
 
     @pytest.mark.parametrize("form", [f.name for f in effect("viscous_damping").forms])

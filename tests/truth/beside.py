@@ -1,0 +1,78 @@
+"""Whether one of two hidden effects can be seen beside the other: what no change of the other, or of the pad, can make.
+
+Each effect of a pair may be plain alone and yet not be told beside the other: what the one makes, more of the other
+makes nearly as well. Here the pair's force without noise is compared with that of the other effect alone, the
+difference is freed of all that the pad's numbers and the other's size can do to first order, and what is left is
+counted in units of the noise as in `detect`:
+
+    χ² = min over a of ‖W (r(A, B) − r(A) − J a)‖²
+
+with r the force less that of the plain pad on the reported motion, J its derivatives by the pad's numbers and by the
+size of A, W whitening. The shape of A is held, of which nobody told the lab: a shape that bends as well makes B harder
+to see. So what is called hidden here is hidden, and not the other way about.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .cases import Case, draw_case
+from .detect import Lab, _coordinates, _faults, _pad, _sigma, _whitened
+
+Array = np.ndarray
+
+STEP = 0.02
+"""Of a size, for derivatives."""
+
+FAULTS = ("outliers", "stuck_samples")
+"""What nothing else imitates."""
+
+
+def seen_beside(case: Case) -> dict[str, float]:
+    """Of each effect of a pair, χ² of what it makes that neither the other's size nor the pad's numbers can."""
+    truth = case.truth
+    # Jitter is left out: it would be drawn anew, and is noise and no effect.
+    told = truth.overrides | {
+        "drawn": truth.drawn,
+        "motion": truth.motion,
+        "rate_hz": truth.rate_hz,
+        "own_clock": case.force_time_s is not None,
+        "jitter": "none",
+    }
+
+    def drawn(*ids: str, **factors: float) -> Case:
+        sizes = {id: truth.sizes[id] * factors.get(id, 1.0) for id in ids}
+        return draw_case(truth.seed, ids, sizes, {id: truth.shapes[id] for id in ids}, **told)
+
+    both = drawn(*truth.ids)
+    lab, structure = Lab(both.truth), both.truth.structure
+    sigma = _sigma(both.truth, lab)
+
+    def weighed(force: Array) -> Array:
+        return _whitened(truth.noise, both.truth.label_time_s, force * truth.noise.std / sigma)
+
+    x = _coordinates(structure)
+    steps = [1e-4 * max(abs(x[k]), 0.1) * (np.arange(len(x)) == k) for k in range(len(x))]
+    of_pad = [weighed(lab.force(_pad(structure, x + h)) - lab.force(_pad(structure, x - h))) for h in steps]
+    out = {}
+    for id in truth.ids:
+        (other,) = (known for known in truth.ids if known != id)
+        more, less = (_beyond(drawn(*truth.ids, **{other: 1 + sign * STEP})) for sign in (1, -1))
+        own = weighed(_beyond(both) - _beyond(drawn(other)))
+        out[id] = _left(own, [*of_pad, weighed(more - less)])
+        if id in FAULTS:
+            out[id] += _faults(both.truth, sigma)
+    return out
+
+
+def _beyond(drawn: Case) -> Array:
+    """What the force has beyond the plain pad's on the reported motion, N."""
+    return drawn.truth.clean_N - Lab(drawn.truth).force(drawn.truth.structure)
+
+
+def _left(own: Array, columns: list[Array]) -> float:
+    """Square of what no sum of the columns makes."""
+    J = np.stack(columns, axis=1)
+    J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
+    left = own - J @ np.linalg.lstsq(J, own, rcond=None)[0]
+    return float(left @ left)
