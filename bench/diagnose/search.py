@@ -24,6 +24,7 @@ SAME = 0.6  # share of a further cause's gain that another shape of a cause foun
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
 CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
+RIVAL = 25.0  # Δχ², beyond chance
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 MOST_CAUSES = 3
 RIVALS = 2  # beside the best, that are asked for their best shapes
@@ -56,7 +57,7 @@ class Search(Sieve):
             if not ranked:
                 break
             best, base = ranked[0], path.fits[0]
-            reshaped = min((t.fit.chi2 for t in every if t.id in present), default=np.inf)
+            beside = min((t for t in every if t.id in present), key=lambda t: t.fit.chi2, default=None)
             now = path.fits[-1] = self.settled(path.fits[-1], best.fit)
             found = self.judge(now, best.fit, base)
             more = found.pays or now.chi2 > MISFIT * self.expected
@@ -73,15 +74,21 @@ class Search(Sieve):
                 best = ranked[0]
                 now = path.fits[-1] = self.settled(now, best.fit)
                 found = self.judge(now, best.fit, base)
+            no_other = beside is not None and self._reshaped(now.chi2, best.fit.chi2, beside.fit.chi2)
+            if no_other and beside is not None:
+                united = self._united(now, beside)
+                if now.chi2 - united.chi2 > SAME * (now.chi2 - beside.fit.chi2):
+                    path.fits[-1] = united
+                    continue
             small = [t for t in tried if t.id not in present and too_small(t.fit, self.prepared)]
             path.rivals.append([*ranked, *small])
             path.tried.append([t.id for t in tried])
             path.measures.append(Measure(self.expected, self.effective, self.prepared.memory))
             path.evidence.append(found)
-            if self._reshaped(now.chi2, best.fit.chi2, reshaped):
+            if no_other:
                 break
             path.fits.append(best.fit)
-            if len(path.fits) > 2 and best.fit.chi2 > 1.05 * self.expected and (found.pays or more):
+            if len(path.fits) > 2 and (found.pays or more):
                 path.fits[-1] = self.exchanged(path)
             if not found.pays:  # what stood first may have been in the place of two others
                 path.evidence[-1] = self.judge(now, path.fits[-1], base)
@@ -111,7 +118,7 @@ class Search(Sieve):
         """The best and those near it with the causes in their best shapes, where the best leaves something that tells
         them apart and another comes in front so, or a further cause leaves next to nothing; or `anyway`."""
         best = ranked[0]
-        near = [t for t in ranked[1:] if now.chi2 - t.fit.chi2 > CLOSE * (now.chi2 - best.fit.chi2)][:RIVALS]
+        near = [t for t in ranked[1:] if t.id in self._near(now, ranked)]
         if not anyway and (not near or unexplained(best.fit.chi2, self.expected) <= 0.0):
             return ranked
         with ThreadPoolExecutor(WORKERS) as pool:
@@ -144,10 +151,35 @@ class Search(Sieve):
         """Whether another shape of a cause found does what a further cause did. All are χ²."""
         return before - reshaped > SAME * (before - after) and not self._alone_clean(before, after, reshaped)
 
+    def _united(self, now: Fit, beside: Trial) -> Fit:
+        """The fit with one cause in place of two of a kind, itself and another shape of it: a shape that has what both
+        have, from their numbers; the fit itself where there is none."""
+        index = next(k for k, cause in enumerate(now.structure.causes) if cause.id == beside.id)
+        both = beside.fit.structure.values(beside.fit.x)
+        one, other = both[index], both[-1]
+        structure, x = reduced(beside.fit, len(both) - 1)
+        structure, x = reduced(replace(beside.fit, structure=structure, x=x), index)
+        without = replace(beside.fit, structure=structure, x=x)
+        best = now
+        for form in beside.cause.effect.forms:
+            cause = cause_of(beside.cause.effect, form)
+            amplitude = cause.amplitude
+            names = {p.name for p in cause.fitted}
+            if amplitude is None or not names > {p.name for p in beside.cause.fitted}:
+                continue
+            for values in ({**other, **one}, {**one, **other}):
+                told = {name: value for name, value in values.items() if name in names}
+                told[amplitude.name] = one[amplitude.name] + other[amplitude.name]
+                trial = self._joined(without, cause.with_start(**told), ALL, None)
+                if trial is not None and trial.fit.chi2 < best.chi2 and believable(trial.fit, self.prepared):
+                    best = trial.fit
+        return best
+
     def _alone_clean(self, before: float, after: float, reshaped: float) -> bool:
-        """Whether a further cause leaves nothing, and another shape of a cause found something."""
+        """Whether a further cause leaves nothing, and another shape of a cause found something beyond chance."""
         left = max(before - self.expected, 1e-9)
-        return after - self.expected < CLEAN * left and reshaped - self.expected > UNCLEAN * left
+        clean = after - self.expected < max(CLEAN * left, float(np.sqrt(2.0 * self.expected)))
+        return clean and reshaped - after > max(UNCLEAN * left, RIVAL * self.prepared.memory)
 
     def recurved(self, now: Fit) -> Fit:
         """The fit with one of its causes in another form, also of those that only refine others; if that is better."""
@@ -172,6 +204,11 @@ class Search(Sieve):
         others = [fit for fit in fits if not departed(fit, len(fit.structure.causes) - 1)]
         return min([now, *others], key=lambda fit: fit.chi2)
 
+    def _near(self, before: Fit, ranked: Sequence[Trial]) -> list[str]:
+        """Ids that stood close behind the first of a stage."""
+        gain = before.chi2 - ranked[0].fit.chi2
+        return [t.id for t in ranked[1 : 1 + RIVALS] if before.chi2 - t.fit.chi2 > CLOSE * gain]
+
     def settled(self, now: Fit, joined: Fit) -> Fit:
         """The fit before a cause was added, or a better one that the addition has led to: a valley may be long."""
         structure, x = reduced(joined, len(joined.structure.causes) - 1)
@@ -184,12 +221,15 @@ class Search(Sieve):
 
     def exchanged(self, path: Path) -> Fit:
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
-        out."""
+        out. Where nothing is left, those alone that stood near: what made them worse may have been the other cause."""
         best = path.fits[-1]
         score = best.chi2 + self._penalty(best)
         own = len(self.believed.causes)
         for index in range(own, len(best.structure.causes)):
-            rivals = path.tried[min(index - own, len(path.tried) - 1)][:5] + path.tried[-1][:4]
+            stage = min(index - own, len(path.tried) - 1)
+            rivals = path.tried[stage][:5] + path.tried[-1][:4]
+            if path.fits[-1].chi2 <= 1.05 * self.expected:
+                rivals = self._near(path.fits[stage], path.rivals[stage])
             present = {c.id for c in best.structure.causes}
             rivals = [r for r in dict.fromkeys(rivals) if r not in present]
             if not rivals:

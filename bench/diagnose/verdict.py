@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .data import Prepared
-from .evidence import SPEAKS, tempered, unexplained
+from .evidence import CRUMB, tempered, unexplained
 from .held_out import held_out_square
 from .late import LATE
 from .path import Measure, Path, Trial
@@ -69,7 +69,7 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
     for k in range(len(fits) - 2, 0, -1):
         taken = squares[k] - squares[k + 1]
         chance = 2.0 * floor_N * float(np.sqrt(max(taken, 0.0) * memory / n))  # 2 Σ e Δ/n, Δ between the two fits
-        if taken > max(SURELY * chance, SPEAKS * floor_N**2):
+        if taken > max(SURELY * chance, CRUMB * floor_N**2):
             out[k] = max(out[k], out[k + 1] + taken)
     return squares, out
 

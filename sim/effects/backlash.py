@@ -10,6 +10,9 @@
 - `running_out`: the width goes with the place, gap · (1 + swell · sin(2π x/turn + angle)): a gear, pulley or screw that
   runs out, or is worn where it is used most (ISO 230-2: the reversal value is stated for each
   place). `gap` is the mean.
+- `closing`: what has opened closes again under the preload, within `time_constant`: a nut or joint full of grease, of
+  which the film is pressed out (J. Stefan, Versuche über die scheinbare Adhäsion, Sitzungsber. Akad. Wiss. Wien 69,
+  1874, 713–735: the thinner the film, the slower; near one thickness, as an exponential).
 
 Reference: M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash, a survey, Automatica 38, 2002,
 1633–1649.
@@ -69,6 +72,19 @@ def running_out(dt: float, x: float, state: State, p: State) -> float:
         state[1] = x + gap * p[4]
     state[1] = min(max(state[1], x), x + gap)
     return state[1]
+
+
+@block
+def closing(dt: float, x: float, state: State, p: State) -> float:
+    """Probe side, from x to x + gap, and back to x by and by; p = (gap, time_constant). State: started, x, what is
+    open."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[1] = x
+    opened = state[2] * math.exp(-dt / p[1]) - (x - state[1])
+    state[1] = x
+    state[2] = min(max(opened, 0.0), p[0])
+    return x + state[2]
 
 
 @block
@@ -137,6 +153,16 @@ EFFECT = Effect(
             sought=False,
             blocks={"play": running_out},
             state=(0.0, 0.0),
+        ),
+        Form(
+            name="closing",
+            what="what has opened closes by itself, as a film of grease is pressed out",
+            parameters=(
+                _GAP,
+                Parameter("time_constant", "s", 0.01, 100.0, 1.0, "in which it closes to 1/e", starts=(0.3, 1.5)),
+            ),
+            blocks={"play": closing},
+            state=(0.0,) * 3,
         ),
         Form(
             name="loaded",

@@ -274,6 +274,16 @@ class TestBacklash:
         back = slice(1150, 2001)
         assert_allclose(probe[back] - x[back], gap[back], atol=1e-12)
 
+    def test_what_has_opened_closes_again_by_itself(self) -> None:
+        _, probe = Cascade(AIR, [active("backlash", "closing", gap=0.1, time_constant=0.5)]).probe(
+            [0.0, 1.0, 1.01, 1.51, 1.52, 2.02], [0.0, 1.0, 0.8, 0.8, 0.78, 0.78]
+        )
+        once = 0.1 * np.exp(-1.0)  # of what the stop left
+        twice = (once * np.exp(-0.02) + 0.02) * np.exp(-1.0)
+        assert_allclose(probe[:2], [0.0, 1.0], atol=1e-14)
+        assert_allclose(probe[2:4], [0.9, 0.8 + once], atol=1e-14)
+        assert_allclose(probe[5], 0.78 + twice, atol=1e-14)
+
     def test_a_loaded_joint_seats_within_the_closing_force(self) -> None:
         _, probe = Cascade(LINEAR, [active("backlash", "loaded", gap=0.05, closing_force=0.1)]).probe([0, 1], [0, 3.0])
         assert_allclose(probe, [0.0, 3.0 - 0.05], atol=1e-12)
