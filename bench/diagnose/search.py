@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,22 @@ RIVALS = 2  # beside the best, that are asked for their best shapes
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
 
 
+@dataclass
+class _Turn:
+    """What stands to be added to a path: ids tried; candidates, best first; those too small to be named; the best
+    further shape of a cause that is there (`beside`); what the first is worth, and whether there is more to be found.
+    """
+
+    tried: list[str]
+    ranked: list[Trial]
+    small: list[Trial]
+    beside: Trial | None
+    found: Evidence
+    more: bool
+    of_a_shape: bool = False
+    """What is missed is of the shape of a cause that was found, and no form has it."""
+
+
 class Search(Sieve):
     """One search on one measurement."""
 
@@ -44,58 +60,85 @@ class Search(Sieve):
     def path(self, base: Fit) -> Path:
         """Causes one after the other while each pays; then those that others have made needless go."""
         path = Path([base])
-        recurved = 1  # fits on the path when the causes' shapes were last asked
+        asked = 1  # fits on the path when the causes' shapes were last asked
         begun = time.process_time()
         while len(path.fits) <= MOST_CAUSES and time.process_time() - begun < LONGEST_S:
             self._whitened(path)
-            first, memory = len(path.fits) == 1, self.prepared.memory
-            least = least_gain(path.fits[0], memory, self.samples, self.expected, first)
-            tried = self._inside(path, self.ranked(path.fits[-1], least=least))
-            every = [t for t in tried if believable(t.fit, self.prepared)]
-            present = {c.id for c in path.fits[-1].structure.causes}
-            ranked = [t for t in every if t.id not in present]
-            if not ranked:
+            turn = self._turn(path)
+            if turn is None:
                 break
-            best, base = ranked[0], path.fits[0]
-            beside = min((t for t in every if t.id in present), key=lambda t: t.fit.chi2, default=None)
-            now = path.fits[-1] = self.settled(path.fits[-1], best.fit)
-            found = self.judge(now, best.fit, base)
-            more = found.pays or now.chi2 > MISFIT * self.expected
-            other = now
-            if more and len(path.fits) > recurved:
-                recurved, other = len(path.fits), self.recurved(now)
-            same = other is not now and now.chi2 - other.chi2 > SAME * (now.chi2 - best.fit.chi2)
-            if found.pays or same:
-                ranked = self._in_shape(now, ranked, first, same)
-                if same and not self._alone_clean(now.chi2, ranked[0].fit.chi2, other.chi2):
-                    path.fits[-1] = other  # not a further cause, but one found of another shape
-                    continue
-            if ranked[0] is not best:
-                best = ranked[0]
-                now = path.fits[-1] = self.settled(now, best.fit)
-                found = self.judge(now, best.fit, base)
-            no_other = beside is not None and self._reshaped(now.chi2, best.fit.chi2, beside.fit.chi2)
-            if no_other and beside is not None:
-                united = self._united(now, beside)
-                if now.chi2 - united.chi2 > SAME * (now.chi2 - beside.fit.chi2):
-                    path.fits[-1] = united
-                    continue
-            small = [t for t in tried if t.id not in present and too_small(t.fit, self.prepared)]
-            path.rivals.append([*ranked, *small])
-            path.tried.append([t.id for t in tried])
-            path.measures.append(Measure(self.expected, self.effective, self.prepared.memory))
-            path.evidence.append(found)
-            if no_other:
+            again = turn.more and len(path.fits) > asked
+            asked = len(path.fits) if again else asked
+            other = self._another_shape(path, turn, again)
+            if other is not None:  # not a further cause, but one found of another shape
+                path.fits[-1] = other
+                continue
+            self._note(path, turn)
+            if turn.of_a_shape or not self._added(path, turn):
                 break
-            path.fits.append(best.fit)
-            if len(path.fits) > 2 and (found.pays or more):
-                path.fits[-1] = self.exchanged(path)
-            if not found.pays:  # what stood first may have been in the place of two others
-                path.evidence[-1] = self.judge(now, path.fits[-1], base)
-                if not path.evidence[-1].pays:
-                    path.fits.pop()
-                    break
         return path
+
+    def _turn(self, path: Path) -> _Turn | None:
+        """What stands to be added to a path, and what it is worth; None: nothing does."""
+        now, first = path.fits[-1], len(path.fits) == 1
+        least = least_gain(path.fits[0], self.prepared.memory, self.samples, self.expected, first)
+        tried = self._inside(path, self.ranked(now, least=least))
+        every = [t for t in tried if believable(t.fit, self.prepared)]
+        present = {c.id for c in now.structure.causes}
+        ranked = [t for t in every if t.id not in present]
+        if not ranked:
+            return None
+        small = [t for t in tried if t.id not in present and too_small(t.fit, self.prepared)]
+        beside = min((t for t in every if t.id in present), key=lambda t: t.fit.chi2, default=None)
+        found = self._lead(path, ranked[0])
+        more = found.pays or path.fits[-1].chi2 > MISFIT * self.expected
+        return _Turn([t.id for t in tried], ranked, small, beside, found, more)
+
+    def _lead(self, path: Path, best: Trial) -> Evidence:
+        """What the step to a trial is worth, from the better one of the path's end and what the trial is without its
+        cause."""
+        path.fits[-1] = self.settled(path.fits[-1], best.fit)
+        return self.judge(path.fits[-1], best.fit, path.fits[0])
+
+    def _another_shape(self, path: Path, turn: _Turn, again: bool) -> Fit | None:
+        """The path's end with one of its causes in another shape, where that is what is missed, and no further cause.
+        Else the turn's candidates in their best shapes; `again`: the causes found are asked for theirs."""
+        now, best = path.fits[-1], turn.ranked[0]
+        other = self.recurved(now) if again else now
+        same = other is not now and now.chi2 - other.chi2 > SAME * (now.chi2 - best.fit.chi2)
+        if turn.found.pays or same:
+            turn.ranked = self._in_shape(now, turn.ranked, len(path.fits) == 1, same)
+            if same and not self._alone_clean(now.chi2, turn.ranked[0].fit.chi2, other.chi2):
+                return other
+        if turn.ranked[0] is not best:
+            best = turn.ranked[0]
+            turn.found = self._lead(path, best)
+            now = path.fits[-1]
+        if turn.beside is not None and self._reshaped(now.chi2, best.fit.chi2, turn.beside.fit.chi2):
+            united = self._united(now, turn.beside)
+            if now.chi2 - united.chi2 > SAME * (now.chi2 - turn.beside.fit.chi2):
+                return united
+            turn.of_a_shape = True
+        return None
+
+    def _note(self, path: Path, turn: _Turn) -> None:
+        path.rivals.append([*turn.ranked, *turn.small])
+        path.tried.append(turn.tried)
+        path.measures.append(Measure(self.expected, self.effective, self.prepared.memory))
+        path.evidence.append(turn.found)
+
+    def _added(self, path: Path, turn: _Turn) -> bool:
+        """Whether the turn's first cause pays, or would with earlier ones exchanged: then it is at the path's end."""
+        now = path.fits[-1]
+        path.fits.append(turn.ranked[0].fit)
+        if len(path.fits) > 2 and turn.more:
+            path.fits[-1] = self.exchanged(path)
+        if not turn.found.pays:  # what stood first may have been in the place of two others
+            path.evidence[-1] = self.judge(now, path.fits[-1], path.fits[0])
+            if not path.evidence[-1].pays:
+                path.fits.pop()
+                return False
+        return True
 
     def _inside(self, path: Path, ranked: list[Trial]) -> list[Trial]:
         """With another shape of the leading family in front, where that one pays, has a number at the bound of what can
