@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -56,3 +58,45 @@ def test_where_a_model_runs_away_its_error_has_no_end_and_no_step_is_taken_there
     assert np.isfinite(force_at(data, Structure(pad), pad.x())).all()
     assert chi2(data, Structure(pad), pad.x()) == np.inf
     assert np.array_equal(refit(data, Structure(pad), pad.x(), 5).x, pad.x())
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_two_shapes_of_one_cause_are_united_where_a_form_has_both(seed):
+    """A mass of which a part rings on its adapter: found as one that rings, with a rigid one beside it."""
+    told = {"protocol": "random_steps", "rate_hz": 400.0, "jitter": "none", "own_clock": False}
+    c = draw_case(seed, ("inertia",), 1.0, "stacked", **told, noise_N=0.005, noise_kind="white")
+    search, base = begun(c)
+    now = search.ranked(base, only=["inertia"])[0]
+    beside = min(search.ranked(now.fit, only=["inertia"]), key=lambda t: t.fit.chi2)
+    assert (now.cause.form.name, beside.cause.form.name) == ("sprung", "rigid")
+    united = search._united(now.fit, beside)
+    (cause,) = united.structure.causes
+    assert cause.form.name == "hung" and united.chi2 < 1.02 * beside.fit.chi2 < 0.7 * now.fit.chi2
+    assert united.structure.values(united.x)[0]["mass"] == pytest.approx(c.truth.parameters["inertia"]["mass"], rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("after", "reshaped", "alone"),
+    [
+        (1010.0, 1090.0, True),  # both leave nothing that speaks, and one fits better by far more than chance
+        (1010.0, 1020.0, False),
+        (1200.0, 1260.0, False),  # what leaves something may be of the shape
+        (1010.0, 990.0, False),
+    ],
+)
+def test_a_further_cause_that_leaves_nothing_stands_against_a_shape_that_fits_worse(after, reshaped, alone):
+    judged = SimpleNamespace(expected=1000.0, prepared=SimpleNamespace(memory=1.0))
+    assert Search._alone_clean(judged, 1300.0, after, reshaped) is alone
+
+
+def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
+    """A polynomial is nearest while the clocks part; beside the skew an offset of one number does as well."""
+    told = {"law": "power", "protocol": "staircase", "jitter": "none", "noise_N": 0.005, "noise_kind": "white"}
+    sizes = {"clock_skew": 1.0, "contact_offset": 1.8}
+    c = draw_case(
+        6, ("clock_skew", "contact_offset"), sizes, {"clock_skew": "stamped", "contact_offset": "fixed"}, **told
+    )
+    search, base = begun(c)
+    path = search.path(base)
+    assert path.rivals[0][0].id == "elastic_law"
+    assert {cause.id for cause in path.fits[-1].structure.causes} == set(sizes)
