@@ -20,7 +20,7 @@ from .channel import FEW, Faults, faults, not_of_the_motion, of_the_model, resti
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS, beyond_limit
-from .held_out import held_out_square, later_square
+from .held_out import SEEN, held_out_square, later_square
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
@@ -43,8 +43,11 @@ LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and 
 # held out
 DOUBTED, LITTLE = 0.3, 0.08  # sure of a name, and of the error beyond the noise: a further cause with less is none
 NAMED, TRACE = 0.6, 0.05  # the same, of a further cause where what it and all others leave is next to nothing
+FAINT = 0.25  # of the noise power, that such a cause takes
+MOST = 0.5  # of what was left, that a cause leaves
 NEARLY_ALL = 0.9  # of the error beyond the noise
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
+FADED = 0.25  # of its size as found
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
 SETTLED_S = 0.15  # after a move
@@ -88,6 +91,11 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
         fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + needless), base)
         squares, excess = excesses(prepared, fits, floor)
     whole = _whole(prepared, fits, search.believed)
+    faded = _faded(fits, whole[1])
+    if faded is not None:
+        fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + faded), base)
+        squares, excess = excesses(prepared, fits, floor)
+        whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
 
 
@@ -121,14 +129,17 @@ def _needless(
     rest = [
         np.inf if drifts[k] else later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(last + 1)
     ]
+    for k in range(last + 1):  # what it takes of all that was held out may be more than it does harm to the end alone
+        if excess[k + 1] < MOST * excess[k] and squares[k] - squares[k + 1] > (1.0 - SEEN) * (later - rest[k]):
+            rest[k] = np.inf
     best = int(np.argmin(rest))
     return best if later > HARM * rest[best] else None
 
 
 def _doubtful(path: Path, fits: list[Fit], excess: list[float], apart: float, floor_N: float) -> int | None:
     """Number of a further cause whose name is hardly sure, and that takes little, and less than is left: what left the
-    one may have left the other. Or of one that takes next to nothing, and less than the noise, under a name that may be
-    another, where the rest is as good as explained without it: no shape is exact, and what it misses looks like
+    one may have left the other. Or of one that takes next to nothing, and far less than the noise, under a name that
+    may be another, where the rest is as good as explained without it: no shape is exact, and what it misses looks like
     something."""
     named = [c.id for c in fits[-1].structure.causes[len(fits[0].structure.causes) :]]
     for k in range(len(fits) - 1, 1, -1):
@@ -138,7 +149,7 @@ def _doubtful(path: Path, fits: list[Fit], excess: list[float], apart: float, fl
         if sure < DOUBTED and taken < min(LITTLE * (excess[0] + apart), excess[-1]):
             return k - 1
         trace = TRACE * excess[0]
-        if sure < NAMED and taken < min(trace, floor_N**2) and taken + excess[-1] < 2.0 * trace:
+        if sure < NAMED and taken < min(trace, FAINT * floor_N**2) and taken + excess[-1] < 2.0 * trace:
             return k - 1
     return None
 
@@ -168,6 +179,18 @@ def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fi
     structure = last.structure.with_cause(cause)
     own = structure.x(last.x[: len(structure.pad.coordinates)], None)[structure.of_cause(len(structure.causes) - 1)]
     return before, _spread(prepared, raw, refit(raw, structure, extended(last, own), 8, 1e-8))
+
+
+def _faded(fits: list[Fit], whole: Fit) -> int | None:
+    """Number of a cause of which next to nothing is left once all is fitted together, the hum too; None: there is
+    none."""
+    own = len(fits[0].structure.causes)
+    before, after = fits[-1].structure.values(fits[-1].x), whole.structure.values(whole.x)
+    for k, cause in enumerate(fits[-1].structure.causes[own:]):
+        name = None if cause.amplitude is None else cause.amplitude.name
+        if name is not None and abs(after[own + k][name]) < FADED * abs(before[own + k][name]):
+            return k
+    return None
 
 
 def _spread(prepared: Prepared, data: Data, fit: Fit) -> Fit:

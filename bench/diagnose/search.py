@@ -22,10 +22,12 @@ Array = NDArray[np.float64]
 
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
+AS_WELL = 0.8  # the same, of a second cause of a kind beside the first
 CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 RIVAL = 25.0  # Δχ², beyond chance
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
+NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MOST_CAUSES = 3
 RIVALS = 2  # beside the best, that are asked for their best shapes
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
@@ -181,6 +183,10 @@ class Search(Sieve):
         again = self._trial(last(self.recurved(trial.fit), trial.id))
         return again if again.score < trial.score and believable(again.fit, self.prepared) else trial
 
+    def _told(self, trial: Trial) -> Trial:
+        """A trial in its best shapes, where it leaves something that tells of them."""
+        return self._shaped(trial) if unexplained(trial.fit.chi2, self.expected) > 0.0 else trial
+
     def _whitened(self, path: Path) -> None:
         """Once little is left beside the noise, its colour goes into the cost."""
         if self.prepared.memory == 1.0:
@@ -192,7 +198,7 @@ class Search(Sieve):
 
     def _reshaped(self, before: float, after: float, reshaped: float) -> bool:
         """Whether another shape of a cause found does what a further cause did. All are χ²."""
-        return before - reshaped > SAME * (before - after) and not self._alone_clean(before, after, reshaped)
+        return before - reshaped > AS_WELL * (before - after) and not self._alone_clean(before, after, reshaped)
 
     def _united(self, now: Fit, beside: Trial) -> Fit:
         """The fit with one cause in place of two of a kind, itself and another shape of it: a shape that has what both
@@ -282,6 +288,9 @@ class Search(Sieve):
             if without.chi2 < best.chi2:  # it was in the way
                 return refit(self.short, structure, without.x, ALL, 1e-8)
             for trial in self.ranked(without, only=rivals)[:1]:
+                gained = without.chi2 - trial.fit.chi2
+                if trial.score >= score - 10 and gained > NEARLY * (without.chi2 - best.chi2):
+                    trial = self._told(trial)
                 if trial.score < score - 10 and believable(trial.fit, self.prepared):
                     best, score = trial.fit, trial.score
         return best

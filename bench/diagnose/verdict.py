@@ -59,7 +59,7 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
     a later fit takes it off: two fits share their noise, and their difference is far surer than the floor."""
     squares = [held_out_square(prepared, fit) for fit in fits]
     n, memory = float(prepared.full.weight.sum()), prepared.colour.memory
-    noise_std = max(prepared.floor_square_std, _square_std(prepared, fits[-1]))
+    noise_std = max(prepared.floor_square_std, floor_N**2 * _square_std(prepared, fits[-1]))
     out = []
     for number, (square, fit) in enumerate(zip(squares, fits, strict=True)):
         doubt = 2.0 * noise_std + floor_N**2 * 2.0 * fit.free * memory / n
@@ -75,10 +75,12 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
 
 
 def _square_std(prepared: Prepared, fit: Fit) -> float:
-    """Standard deviation of a mean square of what a fit leaves, N², as its own scatter tells: tails may be heavy."""
+    """Standard deviation of a mean square, over that mean square: as the scatter of what a fit leaves tells, whose
+    tails may be heavy."""
     full = prepared.full
-    left = (full.force_N - force_at(full, fit.structure, fit.x))[full.weight > 0]
-    return float(np.std(left**2) * np.sqrt(prepared.colour.memory / max(len(left), 1)))
+    left = (full.force_N - force_at(full, fit.structure, fit.x))[full.weight > 0] ** 2
+    scatter = float(np.std(left)) / max(float(np.mean(left)), 1e-300)
+    return scatter * float(np.sqrt(prepared.colour.memory / max(len(left), 1)))
 
 
 def explains(left: float, causes: Sequence[CauseFound]) -> bool:
