@@ -117,7 +117,7 @@ def _needless(
         if taken <= 0.0:
             return k
         small = gain <= (LEAST if last == 0 else FURTHER) * scale
-        most_left = gain >= MOST_LEFT * left and gain >= SPEAKS * prepared.floor_N**2
+        most_left = k < 2 and gain >= MOST_LEFT * left and gain >= SPEAKS * prepared.floor_N**2
         if small and not most_left:
             return k
     later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std

@@ -40,7 +40,8 @@ class Evidence:
     """Δχ² over the number of samples."""
     of_left: float
     """Of what was left before the step."""
-    first: bool
+    known: int
+    """Causes found before."""
 
     @property
     def significant(self) -> bool:
@@ -52,7 +53,10 @@ class Evidence:
         """Significant, and large enough to speak of."""
         if not self.significant or self.crumb < CRUMB:
             return False
-        return self.first or self.share >= SHARE or (self.of_left >= MOST_LEFT and self.crumb >= SPEAKS)
+        if self.known == 0 or self.share >= SHARE:
+            return True
+        # a small one beside a giant; but a third that is small has two inexact shapes to be the rest of
+        return self.known == 1 and self.of_left >= MOST_LEFT and self.crumb >= SPEAKS
 
 
 def threshold(freedom: int) -> float:
@@ -85,7 +89,7 @@ def evidence_of(before: Fit, after: Fit, base: Fit, memory: float, samples: floa
         share=delta / max(excess, delta),
         crumb=delta / samples,
         of_left=delta / left,
-        first=before is base,
+        known=len(before.structure.causes) - len(base.structure.causes),
     )
 
 

@@ -206,6 +206,7 @@ class Search(Sieve):
         index = next(k for k, cause in enumerate(now.structure.causes) if cause.id == beside.id)
         both = beside.fit.structure.values(beside.fit.x)
         one, other = both[index], both[-1]
+        beside_names = [p.name for p in beside.cause.fitted]
         structure, x = reduced(beside.fit, len(both) - 1)
         structure, x = reduced(replace(beside.fit, structure=structure, x=x), index)
         without = replace(beside.fit, structure=structure, x=x)
@@ -214,7 +215,7 @@ class Search(Sieve):
             cause = cause_of(beside.cause.effect, form)
             amplitude = cause.amplitude
             names = {p.name for p in cause.fitted}
-            if amplitude is None or not names > {p.name for p in beside.cause.fitted}:
+            if amplitude is None or amplitude.name not in one.keys() & other.keys() or not names > set(beside_names):
                 continue
             for values in ({**other, **one}, {**one, **other}):
                 told = {name: value for name, value in values.items() if name in names}
