@@ -52,6 +52,12 @@ def test_one_that_takes_a_crumb_goes_and_one_that_takes_most_of_what_is_left_sta
 
 
 def test_one_that_does_harm_later_goes_but_a_drift_may_turn(monkeypatch):
-    assert needless(monkeypatch, [400.0, 3.0], [], later=[2.0, 9.0]) == 0
-    assert needless(monkeypatch, [400.0, 3.0], [], ["force_drift"], later=[2.0, 9.0]) is None
+    assert needless(monkeypatch, [400.0, 3.0], [], later=[2.0, 2000.0]) == 0
+    assert needless(monkeypatch, [400.0, 3.0], [], ["force_drift"], later=[2.0, 2000.0]) is None
     assert needless(monkeypatch, [4.0, 2.0], [], ["force_drift"], later=[2.0, 9.0]) == 0
+
+
+def test_what_it_takes_of_all_counts_against_its_harm_later(monkeypatch):
+    assert needless(monkeypatch, [400.0, 3.0], [], later=[2.0, 9.0]) is None  # 397 against a third of 7
+    assert needless(monkeypatch, [400.0, 70.0, 3.0], [70.0], later=[900.0, 2.0, 9.0]) is None
+    assert needless(monkeypatch, [400.0, 70.0, 45.0], [70.0], later=[900.0, 2.0, 9.0]) == 1  # it leaves most

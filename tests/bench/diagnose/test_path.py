@@ -6,6 +6,7 @@ import importlib
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bench.diagnose import verdict
@@ -61,7 +62,7 @@ class Told(Search):
     def judge(self, before: Any, after: Any, base: Any) -> Evidence:
         delta = before.chi2 - after.chi2
         share, of_left = delta / (base.chi2 - NOISE), delta / max(before.chi2 - NOISE, delta, 1e-9)
-        return Evidence(delta, delta, 1, 15.0, share, delta / NOISE, of_left, before is base)
+        return Evidence(delta, delta, 1, 15.0, share, delta / NOISE, of_left, len(before.structure.causes))
 
 
 @pytest.fixture(autouse=True)
@@ -85,6 +86,15 @@ def test_where_a_second_cause_takes_little_but_much_is_left_two_others_may_stand
 
 def test_two_that_do_no_better_together_are_not_taken():
     assert named(Told(RANKS, fit(11e3, "force_drift", "cogging"))) == ["adhesion"]
+
+
+def test_a_third_cause_must_take_its_share_of_all():
+    """Beside one giant a small cause may stand that leaves nothing; beside two it may be what their shapes miss."""
+    first, second = ("force_drift",), ("force_drift", "backlash")
+    ranks = {(): {"force_drift": 5000.0}, first: {"backlash": 1050.0}}
+    assert named(Told(ranks, fit(1050.0, *second))) == list(second)
+    ranks = {(): {"force_drift": 2e6}, first: {"backlash": 4000.0}, second: {"adhesion": 1000.0}}
+    assert named(Told(ranks, fit(4000.0, *second))) == list(second)
 
 
 def test_where_next_to_nothing_is_left_no_two_are_tried():
@@ -140,8 +150,20 @@ def squares(monkeypatch: pytest.MonkeyPatch, values: list[float]) -> list[float]
 
 def test_what_a_later_fit_surely_takes_is_there_however_doubtful_the_floor_is(monkeypatch):
     assert squares(monkeypatch, [2.0, 1.03, 1.00]) == pytest.approx([1.0, 0.03, 0.0])
-    # a hundredth of the noise is none, and within the floor's doubt it stays nothing
-    assert squares(monkeypatch, [2.0, 1.03, 1.025]) == pytest.approx([1.0, 0.0, 0.0])
+    # a five-hundredth of the noise is none, and within the floor's doubt it stays nothing
+    assert squares(monkeypatch, [2.0, 1.03, 1.0285]) == pytest.approx([1.0, 0.0, 0.0])
+
+
+def test_a_misfit_is_not_taken_for_noise_however_it_scatters(monkeypatch):
+    """What is wrong in few samples alone scatters far more than noise does: the floor is no less known for that."""
+    left = np.ones(10_000)
+    left[::500] = 30.0
+    monkeypatch.setattr(verdict, "held_out_square", lambda prepared, fit: float(np.mean(left**2)))
+    monkeypatch.setattr(verdict, "force_at", lambda full, structure, x: -left)
+    full = SimpleNamespace(weight=np.ones(left.size), force_N=np.zeros(left.size))
+    prepared: Any = SimpleNamespace(floor_square_std=0.02, colour=SimpleNamespace(memory=30.0), full=full)
+    fits: list[Any] = [SimpleNamespace(free=3, structure=None, x=None)]
+    assert verdict.excesses(prepared, fits, 1.0)[1] == pytest.approx([np.mean(left**2) - 1.0])
 
 
 @pytest.mark.parametrize(
@@ -152,6 +174,8 @@ def test_what_a_later_fit_surely_takes_is_there_however_doubtful_the_floor_is(mo
         ([4.0, 0.3, 0.0], 0.4, None),  # more than a trace
         ([4.0, 0.5, 0.4], 0.4, None),  # much is left beside it
         ([400.0, 3.0, 0.0], 0.4, None),  # more than the noise
+        ([400.0, 0.3, 0.0], 0.4, None),  # far more than a crumb of it
+        ([400.0, 0.2, 0.0], 0.4, 1),
     ],
 )
 def test_a_further_cause_that_takes_next_to_nothing_under_an_unsure_name_goes(monkeypatch, excess, sure, goes):
