@@ -27,6 +27,7 @@ CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and s
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 RIVAL = 25.0  # Δχ², beyond chance
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
+BETTER = 10.0  # Δχ², times what the best leaves over what noise does: for less no cause is exchanged
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MOST_CAUSES = 3
 RIVALS = 2  # beside the best, that are asked for their best shapes
@@ -273,7 +274,7 @@ class Search(Sieve):
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
         out. Where nothing is left, those alone that stood near: what made them worse may have been the other cause."""
         best = path.fits[-1]
-        score = best.chi2 + self._penalty(best)
+        score = best.chi2 + self._penalty(best) - BETTER * max(best.chi2 / self.expected, 1.0)
         own = len(self.believed.causes)
         for index in range(own, len(best.structure.causes)):
             stage = min(index - own, len(path.tried) - 1)
@@ -290,8 +291,8 @@ class Search(Sieve):
                 return refit(self.short, structure, without.x, ALL, 1e-8)
             for trial in self.ranked(without, only=rivals)[:1]:
                 gained = without.chi2 - trial.fit.chi2
-                if trial.score >= score - 10 and gained > NEARLY * (without.chi2 - best.chi2):
+                if trial.score >= score and gained > NEARLY * (without.chi2 - best.chi2):
                     trial = self._told(trial)
-                if trial.score < score - 10 and believable(trial.fit, self.prepared):
-                    best, score = trial.fit, trial.score
+                if trial.score < score and believable(trial.fit, self.prepared):
+                    best, score = trial.fit, trial.score - BETTER * max(trial.fit.chi2 / self.expected, 1.0)
         return best
