@@ -207,7 +207,7 @@ class Search(Sieve):
         index = next(k for k, cause in enumerate(now.structure.causes) if cause.id == beside.id)
         both = beside.fit.structure.values(beside.fit.x)
         one, other = both[index], both[-1]
-        beside_names = [p.name for p in beside.cause.fitted]
+        told_by_other = {p.name for p in beside.cause.fitted}
         structure, x = reduced(beside.fit, len(both) - 1)
         structure, x = reduced(replace(beside.fit, structure=structure, x=x), index)
         without = replace(beside.fit, structure=structure, x=x)
@@ -216,7 +216,7 @@ class Search(Sieve):
             cause = cause_of(beside.cause.effect, form)
             amplitude = cause.amplitude
             names = {p.name for p in cause.fitted}
-            if amplitude is None or amplitude.name not in one.keys() & other.keys() or not names > set(beside_names):
+            if amplitude is None or amplitude.name not in one.keys() & other.keys() or not names > told_by_other:
                 continue
             for values in ({**other, **one}, {**one, **other}):
                 told = {name: value for name, value in values.items() if name in names}

@@ -10,9 +10,11 @@ import pytest
 from bench.diagnose.channel import faults, not_of_the_motion
 from bench.diagnose.data import Data, prepare
 from bench.diagnose.diagnose import believed_structure
-from bench.diagnose.numbers import PadNumbers, Structure
+from bench.diagnose.numbers import PadNumbers, Structure, cause_of
+from bench.diagnose.path import Trial
 from bench.diagnose.refit import Fit, chi2, force_at, refit
 from bench.diagnose.search import Search
+from sim import effects
 from sim.elastic import Exponential
 from sim.model import Model
 from sim.pad import Pad
@@ -73,6 +75,18 @@ def test_two_shapes_of_one_cause_are_united_where_a_form_has_both(seed):
     (cause,) = united.structure.causes
     assert cause.form.name == "hung" and united.chi2 < 1.02 * beside.fit.chi2 < 0.7 * now.fit.chi2
     assert united.structure.values(united.x)[0]["mass"] == pytest.approx(c.truth.parameters["inertia"]["mass"], rel=0.1)
+
+
+def test_two_of_a_kind_whose_numbers_are_not_the_same_stay_two():
+    """A resonance of the whole path has no share of it; one of a part has."""
+    told = {"protocol": "staircase", "rate_hz": 400.0, "jitter": "none", "own_clock": False}
+    c = draw_case(1, ("resonance",), 1.0, "two_modes", **told, noise_N=0.005, noise_kind="white")
+    search, base = begun(c)
+    joined: dict[str, Trial] = {t.cause.form.name: t for t in search.ranked(base, only=["resonance"])}
+    for form in effects.effect("resonance").forms:
+        for now in joined.values():
+            beside = search._joined(now.fit, cause_of(now.cause.effect, form), 0, None)
+            assert beside is None or search._united(now.fit, beside).chi2 <= now.fit.chi2
 
 
 @pytest.mark.parametrize(
