@@ -21,8 +21,8 @@ from .sieve import ALL, CLOSE, LATER, MORE, WORKERS, Sieve
 Array = NDArray[np.float64]
 
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
-QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
 AS_WELL = 0.8  # the same, of a second cause of a kind beside the first
+QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
 CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 RIVAL = 25.0  # Δχ², beyond chance
@@ -204,7 +204,10 @@ class Search(Sieve):
     def _united(self, now: Fit, beside: Trial) -> Fit:
         """The fit with one cause in place of two of a kind, itself and another shape of it: a shape that has what both
         have, from their numbers; the fit itself where there is none."""
-        index = next(k for k, cause in enumerate(now.structure.causes) if cause.id == beside.id)
+        own = len(self.believed.causes)
+        index = next((k for k, c in enumerate(now.structure.causes) if k >= own and c.id == beside.id), None)
+        if index is None:  # what is believed stays as it is
+            return now
         both = beside.fit.structure.values(beside.fit.x)
         one, other = both[index], both[-1]
         told_by_other = {p.name for p in beside.cause.fitted}

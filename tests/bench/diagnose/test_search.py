@@ -75,6 +75,8 @@ def test_two_shapes_of_one_cause_are_united_where_a_form_has_both(seed):
     (cause,) = united.structure.causes
     assert cause.form.name == "hung" and united.chi2 < 1.02 * beside.fit.chi2 < 0.7 * now.fit.chi2
     assert united.structure.values(united.x)[0]["mass"] == pytest.approx(c.truth.parameters["inertia"]["mass"], rel=0.1)
+    search.believed = now.fit.structure
+    assert search._united(now.fit, beside) is now.fit  # what is believed keeps its shape
 
 
 def test_two_of_a_kind_whose_numbers_are_not_the_same_stay_two():
