@@ -276,8 +276,8 @@ class Search(Sieve):
     def exchanged(self, path: Path) -> Fit:
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
         out. Where nothing is left, those alone that stood near: what made them worse may have been the other cause."""
-        best = path.fits[-1]
-        score = best.chi2 + self._penalty(best) - BETTER * max(best.chi2 / self.expected, 1.0)
+        best, told = path.fits[-1], False
+        score = self._to_beat(best)
         own = len(self.believed.causes)
         for index in range(own, len(best.structure.causes)):
             stage = min(index - own, len(path.tried) - 1)
@@ -295,7 +295,15 @@ class Search(Sieve):
             for trial in self.ranked(without, only=rivals)[:1]:
                 gained = without.chi2 - trial.fit.chi2
                 if trial.score >= score and gained > NEARLY * (without.chi2 - best.chi2):
-                    trial = self._told(trial)
+                    shaped = self._told(trial)
+                    if shaped is not trial and not told:  # shapes against shapes
+                        best, told = self.recurved(best), True
+                        score = self._to_beat(best)
+                    trial = shaped
                 if trial.score < score and believable(trial.fit, self.prepared):
-                    best, score = trial.fit, trial.score - BETTER * max(trial.fit.chi2 / self.expected, 1.0)
+                    best, score = trial.fit, self._to_beat(trial.fit)
         return best
+
+    def _to_beat(self, fit: Fit) -> float:
+        """The score below which another fit is better by more than what both leave."""
+        return fit.chi2 + self._penalty(fit) - BETTER * max(fit.chi2 / self.expected, 1.0)

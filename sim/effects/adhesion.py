@@ -124,7 +124,7 @@ _PULL_OFF = Parameter(
     "pull_off",
     "N",
     0.0,
-    100.0,
+    1e4,
     0.1,
     "greatest pull",
     required=True,

@@ -80,7 +80,7 @@ def bent(dt: float, force: float, state: State, p: State) -> float:
     return force + p[0] * (min(state[0], p[2]) + p[1] * max(state[0] - p[2], 0.0))
 
 
-_RATE = Parameter("rate", "N/s", -100.0, 100.0, 0.002, "rate at the first sample", required=True, amplitude=True)
+_RATE = Parameter("rate", "N/s", -1e4, 1e4, 0.002, "rate at the first sample", required=True, amplitude=True)
 
 
 def _time_constant(what: str) -> Parameter:

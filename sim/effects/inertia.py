@@ -120,7 +120,7 @@ def rigid(dt: float, y: float, state: State, p: State) -> float:
     return _KG_MM * p[0] * (felt + hanging + p[1] * now)
 
 
-_MASS = Parameter("mass", "kg", 0.0, 50.0, 0.1, "mass beyond the cell", required=True, amplitude=True)
+_MASS = Parameter("mass", "kg", 0.0, 500.0, 0.1, "mass beyond the cell", required=True, amplitude=True)
 _LEAD = Parameter(
     "lead", "1", 0.0, 0.6, 0.5, "share of its change that an acceleration is carried on by", starts=(0.0, 0.5)
 )

@@ -80,7 +80,7 @@ _AMPLITUDE = Parameter(
     "amplitude",
     "N",
     0.0,
-    100.0,
+    1e4,
     0.03,
     "force at the crest",
     required=True,

@@ -99,7 +99,7 @@ def one_sided(dt: float, depth: float, state: State, p: State) -> float:
 
 def _coefficient(what: str) -> Parameter:
     return Parameter(
-        "coefficient", "N*s/mm", 0.0, 100.0, 0.005, what, required=True, amplitude=True, starts=(0.002, 0.02)
+        "coefficient", "N*s/mm", 0.0, 1e4, 0.005, what, required=True, amplitude=True, starts=(0.002, 0.02)
     )
 
 
