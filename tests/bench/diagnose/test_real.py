@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 
 from bench.recording.types import Measurement
 from docs import real_diagnosis
@@ -55,8 +56,17 @@ def test_an_axis_is_given_the_names_of_a_bench() -> None:
     found = of("emps_linear_axis", "emps_train.csv")
     assert found.diagnosis is not None
     names = {c.id for c in found.diagnosis.causes}
-    assert "inertia" in names and not names & set(real_diagnosis.PAD_EFFECTS)
+    assert {"inertia", "friction"} <= names and not names & set(real_diagnosis.PAD_EFFECTS)
     assert found.gain >= 0.3
+    (held,) = found.held
+    step_s = float(np.median(np.diff(held.time_s)))
+    speed, change = (savgol_filter(held.position_mm, 21, 3, deriv=n, delta=step_s) for n in (1, 2))
+    moves = np.abs(speed) > 1.0
+    columns = np.stack([1e-3 * change, np.sign(speed), speed, np.ones_like(speed)], axis=1)[moves]
+    (mass_kg, coulomb_N, _, _), *_ = np.linalg.lstsq(columns, held.force_N[moves], rcond=None)
+    told = {c.id: c.parameters for c in found.diagnosis.causes}
+    assert told["inertia"]["mass"].value == pytest.approx(mass_kg, rel=0.1)
+    assert told["friction"]["coulomb"].value == pytest.approx(coulomb_N, rel=0.2)
 
 
 @measured
