@@ -17,6 +17,7 @@ from .shapes import families, scores, stand_in
 Array = NDArray[np.float64]
 
 UNKNOWN = 1.0  # variance of a logarithm with which nothing in the data moves
+WIDEST = 1e6  # times the variance that the stand-in tells
 
 
 def covariance(data: Data, short: Data, fit: Fit) -> Array:
@@ -63,7 +64,8 @@ def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
             if own[position] == 0.0 and c.logarithmic and c.lower < fit.x[position] < c.upper:
                 out[position] = UNKNOWN
                 continue
-            wider = max(own[position] / max(leading[p.name], 1e-300), 1.0) if own[position] > 0 else 1.0
+            told = leading[p.name]  # 0: the stand-in says nothing of it
+            wider = min(max(float(own[position]) / told, 1.0), WIDEST) if told > 0.0 else 1.0
             here = every[place][p.name]
             for w, m in zip(weight[1:], members[1:], strict=True):
                 if p.name not in m.variances:  # a choice of that form, which knows no such number

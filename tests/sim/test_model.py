@@ -108,7 +108,7 @@ def test_shares_may_add_up_to_1() -> None:
         ({"id": "friction", "colomb": 0.1}, "no parameter 'colomb'; did you mean 'coulomb'?"),
         ({"id": "friction"}, "friction (coulomb) needs 'coulomb' in N"),
         ({"id": "friction", "coulomb": {"value": 50, "unit": "mN"}}, "coulomb is in N, not mN"),
-        ({"id": "friction", "coulomb": -0.1}, "coulomb must be from 0 to 50 N, not -0.1"),
+        ({"id": "friction", "coulomb": -0.1}, "coulomb must be from 0 to 5000 N, not -0.1"),
         ({"id": "friction", "coulomb": {"value": 0.1, "sdt": 0.1}}, "sdt: Extra inputs"),
         ({"id": "friction", "coulomb": "much"}, "value: Input should be a valid number"),
         ("friction", "valid dictionary"),

@@ -2,15 +2,17 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from bench.diagnose import spread
 from bench.diagnose.channel import faults, not_of_the_motion
 from bench.diagnose.data import Prepared, prepare
 from bench.diagnose.diagnose import believed_structure
-from bench.diagnose.numbers import cause_of
+from bench.diagnose.numbers import Coordinate, cause_of
 from bench.diagnose.refit import Fit, onto, refit
 from bench.diagnose.shapes import departed, reshaped
 from bench.diagnose.spread import covariance, of_the_noise
@@ -91,3 +93,22 @@ def test_a_shape_without_numbers_of_its_own_has_none_at_a_bound(led):
     c, p, fit = fitted("separation", "clean", led)
     assert not departed(fit, 0)
     assert reshaped(p.short, fit).structure.causes[0].id == "separation"
+
+
+def test_a_number_of_which_the_stand_in_says_nothing_widens_none(monkeypatch):
+    """Variances that are 0 or past all measure, as of a model that has run away, are no error and no warning."""
+    pull = SimpleNamespace(name="coulomb", required=True)
+    structure = SimpleNamespace(
+        values=lambda x: [{"coulomb": 1.0}],
+        of_cause=lambda place: slice(0, 1),
+        causes=[SimpleNamespace(fitted=[pull])],
+        coordinates=[Coordinate("coulomb", 0.0, 10.0)],
+    )
+    fit = SimpleNamespace(structure=structure, x=np.ones(1))
+    for told in (0.0, 1e-200):
+        lead, other = (SimpleNamespace(variances={"coulomb": v}, values={"coulomb": 1.5}) for v in (told, 1e-3))
+        monkeypatch.setattr(spread, "stand_in", lambda short, fit: (fit, [0]))
+        monkeypatch.setattr(spread, "families", lambda short, lead, kept, pair=(lead, other): [list(pair)])
+        monkeypatch.setattr(spread, "scores", lambda short, members: np.zeros(2))
+        added = spread._of_the_shapes(None, fit, np.array([np.float64(1e250)]))
+        assert np.isfinite(added).all() and added[0] >= 0.5 * 0.5**2
