@@ -7,23 +7,13 @@ from .beside import seen_beside
 from .cases import draw_case
 from .detect import ENOUGH, misfit
 from .motion import Path
-
-MOTION = Path(-0.2).hold(0.3).to(1.5, 20.0).hold(0.6).to(0.8, 8.0).hold(0.6).to(-0.2, 20.0).hold(0.3).motion()
-PLAIN = {
-    "motion": MOTION,
-    "noise_kind": "white",
-    "noise_N": 0.01,
-    "jitter": "none",
-    "own_clock": False,
-    "law": "power",
-    "contact": "unilateral",
-    "rate_hz": 500.0,
-}
+from .test_truth_rivals import PLAIN
 
 
 def pair(first, second, shapes, sizes=None, **more):
     """A pair on the one motion."""
-    return draw_case(3, (first, second), sizes or {first: 1.0, second: 1.0}, shapes, **(PLAIN | more))
+    told = PLAIN | {"rate_hz": 500.0} | more
+    return draw_case(3, (first, second), sizes or {first: 1.0, second: 1.0}, shapes, **told)
 
 
 def test_effects_that_have_nothing_in_common_are_seen_as_when_alone():
