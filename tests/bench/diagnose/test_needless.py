@@ -61,3 +61,16 @@ def test_what_it_takes_of_all_counts_against_its_harm_later(monkeypatch):
     assert needless(monkeypatch, [400.0, 3.0], [], later=[2.0, 9.0]) is None  # 397 against a third of 7
     assert needless(monkeypatch, [400.0, 70.0, 3.0], [70.0], later=[900.0, 2.0, 9.0]) is None
     assert needless(monkeypatch, [400.0, 70.0, 45.0], [70.0], later=[900.0, 2.0, 9.0]) == 1  # it leaves most
+
+
+@pytest.mark.parametrize(("after", "gone"), [((-2e-5, 0.05), 0), ((-4e-4, 0.05), None), ((-4e-4, 0.001), 1)])
+def test_a_cause_of_which_nothing_is_left_with_the_hum_beside_it_goes(after, gone):
+    """A bias of 0.4 mN that stood for the mean of what swings; a cause without a size stays whatever it becomes."""
+
+    def fit(*values: float) -> Any:
+        sizes = [SimpleNamespace(name="bias"), SimpleNamespace(name="coulomb"), None]
+        causes = tuple(SimpleNamespace(amplitude=a) for a in sizes[: len(values)])
+        told = [{"bias": v, "coulomb": v, "limit": v} for v in values]
+        return SimpleNamespace(structure=SimpleNamespace(causes=causes, values=lambda x: told), x=None)
+
+    assert module._faded([fit(), fit(-4e-4, 0.05, 8.0)], fit(*after, 0.0)) == gone
