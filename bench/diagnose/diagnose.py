@@ -88,15 +88,22 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
             needless = _doubtful(path, fits, excess, apart, floor)
         if needless is None:
             break
-        fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + needless), base)
-        squares, excess = excesses(prepared, fits, floor)
+        fits, squares, excess = _dropped(prepared, fits, needless, floor)
     whole = _whole(prepared, fits, search.believed)
     faded = _faded(fits, whole[1])
     if faded is not None:
-        fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + faded), base)
-        squares, excess = excesses(prepared, fits, floor)
+        fits, squares, excess = _dropped(prepared, fits, faded, floor)
         whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
+
+
+def _dropped(
+    prepared: Prepared, fits: list[Fit], number: int, floor_N: float
+) -> tuple[list[Fit], list[float], list[float]]:
+    """The chain without one of the causes found, with its held-out squares and excesses."""
+    base = fits[0]
+    fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + number), base)
+    return fits, *excesses(prepared, fits, floor_N)
 
 
 def _needless(

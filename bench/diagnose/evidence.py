@@ -22,6 +22,7 @@ CRUMB = 0.002  # of the noise power: what is smaller is no finding
 EDGE = 1.01  # times a bound, within which a number is at it
 BEYOND = 3.0  # standard deviations of touch-off and tare, within which neither is found wrong
 MOST_LEFT, SPEAKS = 0.6, 0.01  # of what is left, and of the noise power: a cause beside a far larger one takes so much
+RIVAL = 25.0  # Δχ², rescaled by what is left: less excludes no rival
 FEWEST = 3  # samples at fault that are called a fault
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 

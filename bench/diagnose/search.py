@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .candidates import CHANNEL, Signatures, alike, forms, starts
-from .evidence import Evidence, believable, evidence_of, least_gain, too_small, unexplained
+from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, too_small, unexplained
 from .numbers import cause_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
@@ -25,7 +25,6 @@ AS_WELL = 0.8  # the same, of a second cause of a kind beside the first
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
 CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
-RIVAL = 25.0  # Δχ², beyond chance
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 BETTER = 10.0  # Δχ², times what the best leaves over what noise does: for less no cause is exchanged
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .data import Prepared
-from .evidence import CRUMB, tempered, unexplained
+from .evidence import CRUMB, RIVAL, tempered, unexplained
 from .held_out import held_out_square
 from .late import LATE
 from .path import Measure, Path, Trial
@@ -16,7 +16,6 @@ from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
 from .search import Search
 
-RIVAL = 25.0  # Δχ², rescaled by what is left: less does not exclude a rival
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is

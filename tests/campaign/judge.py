@@ -18,7 +18,7 @@ import numpy as np
 
 from tests.truth.beside import seen_beside
 from tests.truth.cases import Case, draw_case
-from tests.truth.detect import Lab, _coordinates, _pad, _sigma, _whitened, misfit, sampling
+from tests.truth.detect import Lab, _sigma, _whitened, freed, misfit, of_the_pad, sampling
 from tests.truth.noise import Coloured, Quantised, StudentT, White
 from tests.truth.rivals import as_good
 
@@ -186,15 +186,12 @@ def bounds(item: Item, names: list[str]) -> dict[str, float]:
     )
     lab = Lab(truth)
     scale = truth.noise.std / _sigma(truth, lab)
-    x = _coordinates(truth.structure)
-    columns = [(above.clean_N - below.clean_N) / (2 * h)]
-    for k in range(len(x)):
-        step = 1e-4 * max(abs(x[k]), 0.1) * (np.arange(len(x)) == k)
-        columns.append((lab.force(_pad(truth.structure, x + step)) - lab.force(_pad(truth.structure, x - step))) / 2)
-    weighed = [_whitened(truth.noise, truth.label_time_s, column * scale) for column in columns]
-    own, pad = weighed[0], np.stack(weighed[1:], axis=1)
-    pad = pad / np.maximum(np.linalg.norm(pad, axis=0), 1e-300)
-    free = own - pad @ np.linalg.lstsq(pad, own, rcond=None)[0]
+
+    def weighed(force: np.ndarray) -> np.ndarray:
+        return _whitened(truth.noise, truth.label_time_s, force * scale)
+
+    own = weighed((above.clean_N - below.clean_N) / (2 * h))
+    free = freed(own, of_the_pad(truth, lab, weighed))
     norm = float(np.linalg.norm(free))
     id, out = item.ids[0], {}
     for name in names:

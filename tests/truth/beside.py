@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from .cases import Case, draw_case
-from .detect import Lab, _coordinates, _faults, _pad, _sigma, _whitened
+from .detect import Lab, _faults, _sigma, _whitened, freed, of_the_pad
 
 Array = np.ndarray
 
@@ -45,21 +45,20 @@ def seen_beside(case: Case) -> dict[str, float]:
         return draw_case(truth.seed, ids, sizes, {id: truth.shapes[id] for id in ids}, **told)
 
     both = drawn(*truth.ids)
-    lab, structure = Lab(both.truth), both.truth.structure
+    lab = Lab(both.truth)
     sigma = _sigma(both.truth, lab)
 
     def weighed(force: Array) -> Array:
         return _whitened(truth.noise, both.truth.label_time_s, force * truth.noise.std / sigma)
 
-    x = _coordinates(structure)
-    steps = [1e-4 * max(abs(x[k]), 0.1) * (np.arange(len(x)) == k) for k in range(len(x))]
-    of_pad = [weighed(lab.force(_pad(structure, x + h)) - lab.force(_pad(structure, x - h))) for h in steps]
+    of_pad = of_the_pad(both.truth, lab, weighed)
     out = {}
     for id in truth.ids:
         (other,) = (known for known in truth.ids if known != id)
         more, less = (_beyond(drawn(*truth.ids, **{other: 1 + sign * STEP})) for sign in (1, -1))
         own = weighed(_beyond(both) - _beyond(drawn(other)))
-        out[id] = _left(own, [*of_pad, weighed(more - less)])
+        left = freed(own, [*of_pad, weighed(more - less)])
+        out[id] = float(left @ left)
         if id in FAULTS:
             out[id] += _faults(both.truth, sigma)
     return out
@@ -68,11 +67,3 @@ def seen_beside(case: Case) -> dict[str, float]:
 def _beyond(drawn: Case) -> Array:
     """What the force has beyond the plain pad's on the reported motion, N."""
     return drawn.truth.clean_N - Lab(drawn.truth).force(drawn.truth.structure)
-
-
-def _left(own: Array, columns: list[Array]) -> float:
-    """Square of what no sum of the columns makes."""
-    J = np.stack(columns, axis=1)
-    J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
-    left = own - J @ np.linalg.lstsq(J, own, rcond=None)[0]
-    return float(left @ left)

@@ -161,6 +161,21 @@ def _whitened(noise: White | Quantised, time_s: np.ndarray, left: np.ndarray) ->
     return noise.whiten(time_s, left[:, None])[:, 0]
 
 
+def of_the_pad(truth: Truth, lab: Lab, weighed: Callable[[np.ndarray], np.ndarray]) -> list[np.ndarray]:
+    """How the plain pad's weighed force goes with each of its numbers, up to a factor."""
+    x = _coordinates(truth.structure)
+    steps = [1e-4 * max(abs(x[k]), 0.1) * (np.arange(len(x)) == k) for k in range(len(x))]
+    pads = [(_pad(truth.structure, x + h), _pad(truth.structure, x - h)) for h in steps]
+    return [weighed(lab.force(above) - lab.force(below)) for above, below in pads]
+
+
+def freed(own: np.ndarray, columns: list[np.ndarray]) -> np.ndarray:
+    """What of a signature no sum of the columns makes."""
+    J = np.stack(columns, axis=1)
+    J = J / np.maximum(np.linalg.norm(J, axis=0), 1e-300)
+    return own - J @ np.linalg.lstsq(J, own, rcond=None)[0]
+
+
 def fitted(truth: Truth, x: np.ndarray, force_of: ForceOf, most: int = 400) -> tuple[np.ndarray, float, np.ndarray]:
     """(numbers, χ², residual in N) of a structure fitted to the case without noise, from `x`.
 
