@@ -1,11 +1,11 @@
-"""The judge's shapes of what lies between the motor and the pad against closed forms."""
+"""The fifth shapes of what lies between the motor and the pad against closed forms."""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from .cases import draw_case
-from .effects.judge_machine import Seam, _edge_slips, _elasto_plastic, _slides
+from .effects.fifth_machine import Seam, _edge_slips, _elasto_plastic, _slides
 from .laws import Power
 from .motion import Path
 from .sets import shapes_of
@@ -13,7 +13,7 @@ from .test_truth_effects import SHORT, hidden
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "fifth"))
 def test_frames(shape, seed):
     fine, told, build = hidden("frame_compliance", shape, 2.0, seed=seed)
     force, given = fine.cell_N[1:], (fine.reported_mm - fine.probe_mm)[1:]
@@ -29,10 +29,10 @@ def test_frames(shape, seed):
         assert np.allclose(force, scale * (y + y**3), atol=1e-6) and build.force_N <= scale <= 2 * build.force_N
 
 
-@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "fifth"))
 @pytest.mark.parametrize("other", ["friction", "adhesion", "viscous_damping", "stress_softening", "damage"])
 def test_the_frame_goes_with_other_effects(shape, other):
-    shapes = {"frame_compliance": shape, other: shapes_of(other, "judge")[-1]}
+    shapes = {"frame_compliance": shape, other: shapes_of(other, "fifth")[-1]}
     plain = {"motion": SHORT, "rate_hz": 500.0, "law": "power", "contact": "unilateral"}
     truth = draw_case(7, ("frame_compliance", other), 1.0, shapes, **plain).truth
     fine, compliance = truth.fine, truth.parameters["frame_compliance"]["compliance"]

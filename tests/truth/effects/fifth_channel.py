@@ -1,4 +1,4 @@
-"""The judge's shapes: faults of the force channel.
+"""The fifth shapes: faults of the force channel.
 
 Sources: power amplifiers that bend towards their limit (Rapp 1991); transmitters that send a fixed code where they find
 themselves at fault (NAMUR NE 43), and multiplexers that give the neighbour's value (Horowitz and Hill, The Art of
@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, judge_shapes
+from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, more_shapes
 
 
-@judge_shapes("saturation", "rapp")
+@more_shapes("saturation", "rapp")
 def saturation(build: Build, shape: str, size: float) -> dict[str, float]:
     """F/(1 + (F/L)^{2p})^{1/2p}, p of 6 to 12: nearly straight up to nine tenths of the limit L, and never above it."""
     share = max(1 - 0.2 * size * float(build.rng.uniform(0.8, 1.2)), 0.3)
@@ -33,7 +33,7 @@ def saturation(build: Build, shape: str, size: float) -> dict[str, float]:
     return told
 
 
-@judge_shapes("outliers", "error_code", "neighbour")
+@more_shapes("outliers", "error_code", "neighbour")
 def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     """A fixed value beyond the range, whichever the force; or the value of the channel beside it, the position.
 
@@ -59,7 +59,7 @@ def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     return fraction
 
 
-@judge_shapes("stuck_samples", "range_relay", "heavy_tail")
+@more_shapes("stuck_samples", "range_relay", "heavy_tail")
 def stuck_samples(build: Build, shape: str, size: float) -> dict[str, float]:
     """A relay changes the range each time the force goes through a level; or waits of two samples to a second.
 

@@ -1,4 +1,4 @@
-"""The judge's effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""The fifth shapes: effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together.
 """
@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .fifth_pad import _pressed
 from .fourth_outside_pad import _follows, _touches
-from .judge_pad import _pressed
 from .outside_bench import _child
 from .outside_pad import _added
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 
 
-@judge_effect("compaction", "logarithmic", "shaken_loose")
+@effect("compaction", "logarithmic", "shaken_loose")
 def compaction(build: Build, shape: str, size: float) -> dict[str, float]:
     """A pad of grains or fibres packs as it is pressed, and is stiffer from then on (Knight et al. 1995).
 
@@ -37,7 +37,7 @@ def compaction(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"growth": growth, "length": length}
 
 
-@judge_effect("crystallisation", "at_once_gone", "lingers")
+@effect("crystallisation", "at_once_gone", "lingers")
 def crystallisation(build: Build, shape: str, size: float) -> dict[str, float]:
     """Deep down, rubber crystallises as time goes, and is stiffer the longer it is held; it melts as it is let go.
 
@@ -56,7 +56,7 @@ def crystallisation(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"growth": growth, "takes": takes_s}
 
 
-@judge_effect("bubbles", "one", "several")
+@effect("bubbles", "one", "several")
 def bubbles(build: Build, shape: str, size: float) -> dict[str, float]:
     """Gas gathers under the skin and lifts the surface, until it escapes at once (Scriven 1959, growth as √t).
 
@@ -79,7 +79,7 @@ def bubbles(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"rise": rise, "every": every_s}
 
 
-@judge_effect("creases", "now_and_then", "one_of_three")
+@effect("creases", "now_and_then", "one_of_three")
 def creases(build: Build, shape: str, size: float) -> dict[str, float]:
     """The skin folds beneath the probe in some of the touches, and bears more from some depth on (Gent and Cho 1999).
 
@@ -115,7 +115,7 @@ def _withdrawn(load, h, hurts, late_s, draws_s, calm_s):
     return out
 
 
-@judge_effect("withdrawal", "reflex", "learns")
+@effect("withdrawal", "reflex", "learns")
 def withdrawal(build: Build, shape: str, size: float) -> dict[str, float]:
     """A living pad draws back where it is pressed too hard, 0.1 to 0.25 s late (Sherrington 1910).
 

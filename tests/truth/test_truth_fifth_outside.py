@@ -1,11 +1,11 @@
-"""The judge's effects outside the catalogue: each is what its docstring says."""
+"""The fifth effects outside the catalogue: each is what its docstring says."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_outside_bench import _door, _sleeps
-from .effects.judge_outside_pad import _withdrawn
-from .effects.judge_pad import _pressed
+from .effects.fifth_outside_bench import _door, _sleeps
+from .effects.fifth_outside_pad import _withdrawn
+from .effects.fifth_pad import _pressed
 from .effects.registry import EFFECTS
 from .motion import Path
 from .sets import shapes_of
@@ -18,11 +18,11 @@ HELD = Path(1.0).hold(60.0).motion()  # a spring of 3 N/mm, held at 1 mm of 2
 
 
 def test_they_are_of_the_bench_or_of_the_pad():
-    mine = [id for id in EFFECTS if id not in CATALOGUE and shapes_of(id, "judge")]
+    mine = [id for id in EFFECTS if id not in CATALOGUE and shapes_of(id, "fifth")]
     assert len(mine) == 11 and all(EFFECTS[id].shapes == () for id in mine)
 
 
-@pytest.mark.parametrize("shape", shapes_of("swapped_blocks", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("swapped_blocks", "fifth"))
 def test_blocks_change_places(shape):
     _, told, build = hidden("swapped_blocks", shape, motion=HELD)
     t, block = np.arange(0, 60, 1e-4), told["block"]
@@ -59,7 +59,7 @@ def test_a_swinging_door_keeps_within_its_band():
     assert bends.sum() < 1.3 * fine.time_s[-1] / told["every"] and bends[moves].sum() > 10
 
 
-@pytest.mark.parametrize("shape", shapes_of("air_hammer", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("air_hammer", "fifth"))
 def test_a_bearing_swings_under_some_loads(shape):
     path = Path(-0.5)
     for depth in (0.1, 0.9, 1.95):  # 0.05, 0.45 and 0.97 of the load
@@ -78,7 +78,7 @@ def test_a_bearing_swings_under_some_loads(shape):
     assert spectrum[near].sum() > 0.95 * spectrum.sum() and spectrum.max() < 0.7 * spectrum.sum()
 
 
-@pytest.mark.parametrize("shape", shapes_of("carrier_beat", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("carrier_beat", "fifth"))
 def test_carriers_beat(shape):
     _, told, build = hidden("carrier_beat", shape, motion=Path(-1.0).hold(400.0).motion())
     t = np.arange(0, 400, 5e-3)
@@ -140,7 +140,7 @@ def test_a_pad_that_packs():
     assert 300 * 2.6 / 20 / 15 / 3 < len(falls) < 300 * 2.6 / 20 / 6 * 2 and np.all(stiffer[falls + 1] < 0.05)
 
 
-@pytest.mark.parametrize("shape", shapes_of("crystallisation", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("crystallisation", "fifth"))
 def test_rubber_crystallises_deep_down(shape):
     motion = Path(2.0).hold(20.0).to(1.6, 1000.0).hold(2.0).to(0.5, 1000.0).hold(1.0).motion()
     fine, told, _ = hidden("crystallisation", shape, motion=motion)
@@ -175,7 +175,7 @@ def test_gas_lifts_the_surface_and_escapes():
     assert 2.2 < len(many) * told["every"] / 200 < 3.8
 
 
-@pytest.mark.parametrize("shape", shapes_of("creases", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("creases", "fifth"))
 def test_the_skin_folds_in_some_touches(shape):
     path = Path(-0.5)
     for _ in range(40):

@@ -1,4 +1,4 @@
-"""The judge's shapes: the pad's own effects. Those in which force and motion act on each other are forms of `kernel`.
+"""The fifth shapes: the pad's own effects. Those in which force and motion act on each other are forms of `kernel`.
 
 Sources: tapes that hold less each time (Creton and Ciccotti 2016); smooth laws of traction and separation (Xu and
 Needleman 1994) and tack that grows while it is pressed (Zosel 1985); foamed rubber (Blatz and Ko 1962), and pads that
@@ -25,11 +25,11 @@ from ..laws import Law, _Tabulated
 from ..pad import Pad
 from .curves import stretched
 from .outside_bench import _child
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .structure import hide_law
 
 
-@judge_shapes("separation", "wears_off")
+@more_shapes("separation", "wears_off")
 def separation(build: Build, shape: str, size: float) -> dict[str, float]:
     """The lab believes `bonded`. A tape bears 1.5 % of the greatest force, and half as much each next time."""
     build.believed = replace(build.believed, contact="bonded")
@@ -37,7 +37,7 @@ def separation(build: Build, shape: str, size: float) -> dict[str, float]:
     return {}
 
 
-@judge_shapes("adhesion", "smooth", "tack")
+@more_shapes("adhesion", "smooth", "tack")
 def adhesion(build: Build, shape: str, size: float) -> dict[str, float]:
     """P q e^{1−q} with q = 3 g/range, on the way in too; or a neck that bears 1 − e^{−t/τ} of P after a contact of t.
 
@@ -81,7 +81,7 @@ class RambergOsgood(_Tabulated):
         return self.modulus * f
 
 
-@judge_shapes("elastic_law", "blatz_ko", "ramberg_osgood")
+@more_shapes("elastic_law", "blatz_ko", "ramberg_osgood")
 def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     """The true law is that of the name; the believed one is fitted to it. Sizes but 1 lie between (or beyond) both."""
     rng, depth = build.rng, build.depth_mm
@@ -91,7 +91,7 @@ def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     return hide_law(build, shape, other, size)
 
 
-@judge_shapes("stress_softening", "hyperbola", "heals")
+@more_shapes("stress_softening", "hyperbola", "heals")
 def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
     """η = 1 − s q/(1 + q) with q = (δ_max − δ)/(0.6 d); or the exponential one, whose δ_max is forgotten.
 
@@ -114,7 +114,7 @@ def _pressed(x):
     return out
 
 
-@judge_shapes("damage", "by_work", "fibres")
+@more_shapes("damage", "by_work", "fibres")
 def damage(build: Build, shape: str, size: float) -> dict[str, float]:
     """e^{−r Λ} with Λ the work over its mean by the mm; or fibres that break one by one, at random, each a like share.
 
@@ -148,7 +148,7 @@ def _ratchets(x, h, per_cycle, takes_s):
     return out
 
 
-@judge_shapes("permanent_set", "ratchets", "by_load")
+@more_shapes("permanent_set", "ratchets", "by_load")
 def permanent_set(build: Build, shape: str, size: float) -> dict[str, float]:
     """A little more with each cycle, by 10 to 20 % for each e-fold of their number; or in proportion to the load.
 
@@ -185,7 +185,7 @@ def ending_rates(power: float, rate: float) -> tuple[np.ndarray, np.ndarray]:
     return weights, power * rate / times
 
 
-@judge_shapes("missing_relaxation_mode", "rouse", "ending")
+@more_shapes("missing_relaxation_mode", "rouse", "ending")
 def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, float]:
     """A chain of four to seven beads, 1/e of it left at 1/rate; or a spectrum with a longest time, 1/rate in the mean.
 
@@ -206,7 +206,7 @@ def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, 
     return {"share": share, "rate": rate}
 
 
-@judge_shapes("depth_dependent_relaxation", "falls_in", "later")
+@more_shapes("depth_dependent_relaxation", "falls_in", "later")
 def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[str, float]:
     """An S about the middle, as cells fall in; or nothing up to 0.3 to 0.5 of the depth, a straight line from there.
 
@@ -231,7 +231,7 @@ def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[st
     return {"slope": slope}
 
 
-@judge_shapes("viscous_damping", "squeezed_film", "forchheimer")
+@more_shapes("viscous_damping", "squeezed_film", "forchheimer")
 def viscous_damping(build: Build, shape: str, size: float) -> dict[str, float]:
     """c v ((H − δ_ref)/(H − δ))³, H of 2.5 to 4 depths; or c v (1 + |v|/v_0)/(1 + v_ref/v_0), v_0 of 20 to 80 mm/s.
 

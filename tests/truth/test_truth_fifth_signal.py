@@ -1,11 +1,11 @@
-"""The judge's shapes from the cell to the sample, and of the channel's faults, against closed forms."""
+"""The fifth shapes from the cell to the sample, and of the channel's faults, against closed forms."""
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 from .cases import draw_case
-from .effects.judge_signal import _oil
+from .effects.fifth_signal import _oil
 from .effects.registry import SATURATION, Samples
 from .motion import Path
 from .sets import shapes_of
@@ -50,7 +50,7 @@ def test_a_mount_of_rubber():
         assert gain(build, 0.5) == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.parametrize("shape", shapes_of("sensor_lag", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("sensor_lag", "fifth"))
 @pytest.mark.parametrize("size", [0.05, 1.0])
 def test_a_filter_is_late_by_its_delay(shape, size):
     motion = Path(0.0, np.inf).to(2.0, 10.0).hold(0.2).motion()
@@ -91,7 +91,7 @@ def test_delays_by_turns_and_by_load():
 
 def test_clocks():
     motion = Path(-0.5).to(1.0, 0.5).hold(30.0).to(-0.5, 0.5).hold(10.0).motion()
-    for shape in shapes_of("clock_skew", "judge"):
+    for shape in shapes_of("clock_skew", "fifth"):
         case = draw_case(3, ("clock_skew",), 1.0, shape, **QUIET | {"own_clock": True, "motion": motion})
         t, off = case.truth.force_true_time_s, case.force_time_s - case.truth.force_true_time_s
         skew, rates = 1e-6 * case.truth.parameters["clock_skew"]["skew"], np.diff(off) / np.diff(t)
@@ -169,7 +169,7 @@ def test_an_amplifier_that_bends():
     assert np.interp(0.75 * limit, ramp, out) == pytest.approx(0.75 * limit, rel=5e-3)
 
 
-@pytest.mark.parametrize("shape", shapes_of("outliers", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("outliers", "fifth"))
 def test_outliers(shape):
     case = draw_case(2, ("outliers",), 1.0, shape, **MANY)
     truth, hit = case.truth, case.truth.flags["outlier"]
@@ -183,7 +183,7 @@ def test_outliers(shape):
         assert np.allclose(case.force_N[hit], case.position_mm[hit], atol=0.01)
 
 
-@pytest.mark.parametrize("shape", shapes_of("stuck_samples", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("stuck_samples", "fifth"))
 def test_stuck_samples(shape):
     case = draw_case(2, ("stuck_samples",), 1.0, shape, **MANY)
     stuck, clean = case.truth.flags["stuck"], case.truth.clean_N / np.max(case.truth.clean_N)

@@ -1,4 +1,4 @@
-"""The judge's shapes: what lies between the motor and the pad.
+"""The fifth shapes: what lies between the motor and the pad.
 
 Sources: flat joints of machine tools, which give way by the root of the pressure (Levina and Reshetov 1971, Back,
 Burdekin and Cowley 1973), and diaphragms, which stretch as they bend (Timoshenko and Woinowsky-Krieger, Theory of
@@ -22,12 +22,12 @@ from numba import njit
 
 from ..laws import Law, _Tabulated
 from .outside_bench import _child
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import second_order
 from .third_machine import _gms, _sliding, _worn
 
 
-@judge_shapes("frame_compliance", "flat_joint", "diaphragm")
+@more_shapes("frame_compliance", "flat_joint", "diaphragm")
 def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     """A joint that gives way by √(1 + F/F_0) − 1, beside what is linear; or a plate with y + y³ = F/F_0, y = d/(C F_0).
 
@@ -48,7 +48,7 @@ def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"compliance": compliance}
 
 
-@judge_shapes("backlash", "warms", "oil_wedge")
+@more_shapes("backlash", "warms", "oil_wedge")
 def backlash(build: Build, shape: str, size: float) -> dict[str, float]:
     """The nut warms, and its clearance closes by a third to a half; or a film carries up to a third of it at speed.
 
@@ -90,7 +90,7 @@ class Seam(_Tabulated):
         return self.law.model(depth_mm)
 
 
-@judge_shapes("contact_offset", "seam", "rehomed")
+@more_shapes("contact_offset", "seam", "rehomed")
 def contact_offset(build: Build, shape: str, size: float) -> dict[str, float]:
     """A fifth to two fifths of the surface is a seam, up to 20 µm higher; or the machine is homed anew once.
 
@@ -138,7 +138,7 @@ def _edge_slips(count: int = 20) -> tuple[np.ndarray, np.ndarray]:
     return at[1:], -np.diff(stiffness) * at[1:]
 
 
-@judge_shapes("friction", "elasto_plastic", "edge_slips", "ball_passage")
+@more_shapes("friction", "elasto_plastic", "edge_slips", "ball_passage")
 def friction(build: Build, shape: str, size: float) -> dict[str, float]:
     """Elastic up to 0.4 to 0.7 of its deflection; a contact that slips from its edge; or balls that come in and go.
 
@@ -172,7 +172,7 @@ def _slides(v, h, most):
     return out
 
 
-@judge_shapes("inertia", "loose_block", "slosh")
+@more_shapes("inertia", "loose_block", "slosh")
 def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     """A fifth to a third of it lies loose and slides where it is pushed too hard; or as much is a liquid that sloshes.
 
@@ -193,7 +193,7 @@ def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"mass": mass}
 
 
-@judge_shapes("cogging", "commutation", "uneven_magnets")
+@more_shapes("cogging", "commutation", "uneven_magnets")
 def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     """Blocks of current that are switched, |sin| with its cusps; or magnets that differ, by a fifth and in place.
 
@@ -220,7 +220,7 @@ def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "period": period}
 
 
-@judge_shapes("encoder_error", "averaged", "ball_screw")
+@more_shapes("encoder_error", "averaged", "ball_screw")
 def encoder_error(build: Build, shape: str, size: float) -> dict[str, float]:
     """An interpolator that averages over time, so that fast motions see less of it; or a screw with a second wave.
 

@@ -1,10 +1,10 @@
-"""The judge's shapes of the pad's own effects against closed forms."""
+"""The fifth shapes of the pad's own effects against closed forms."""
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from .effects.judge_pad import BlatzKo, RambergOsgood, ending_rates, rouse_rates
+from .effects.fifth_pad import BlatzKo, RambergOsgood, ending_rates, rouse_rates
 from .laws import Power
 from .motion import Path
 from .pad import Pad
@@ -148,7 +148,7 @@ def test_spectra_of_relaxation():
         assert np.max(np.abs(parts - (1 + 0.5j * omega / power) ** -power)) < 0.015
 
 
-@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "fifth"))
 def test_what_is_added_has_its_share(shape):
     pad = Pad(Power(3.0, 0.0), (0.3,), (50.0,))
     fine, told, build = hidden("missing_relaxation_mode", shape, pad=pad, motion=Path(2.0).hold(100.0).motion())
@@ -159,7 +159,7 @@ def test_what_is_added_has_its_share(shape):
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("shape", shapes_of("depth_dependent_relaxation", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("depth_dependent_relaxation", "fifth"))
 def test_rates_by_depth(shape, seed):
     rates = {}
     for depth in (0.05, 0.5, 1.0, 1.5, 1.75, 2.0):
@@ -178,7 +178,7 @@ def test_rates_by_depth(shape, seed):
         assert grown[0.05] < 0.03 and grown[1.75] > 0.9 and 0.1 < grown[1.0] < 0.9
 
 
-@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "fifth"))
 def test_damping(shape):
     for speed in (5.0, 20.0, 60.0):
         motion = Path(-0.5).to(1.9, speed).hold(0.1).to(0.5, speed).hold(0.1).motion()

@@ -1,4 +1,4 @@
-"""The judge's shapes: from the cell to the sample.
+"""The fifth shapes: from the cell to the sample.
 
 Sources: dampers of oil, whose drag goes with the square of speed (Nayfeh and Mook, Nonlinear Oscillations), and mounts
 of rubber with a spring behind their damper (Ruzicka and Derby 1971); lines with resistance and capacity all along
@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from scipy.signal import lfilter
 
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import _LAG, _RESONANCE, _disturb, first_order, ramp_filter
 from .third_machine import _fundamental
 
@@ -46,7 +46,7 @@ def zener_mount(more: float, late: float) -> tuple[np.ndarray, float, float]:
     return den, float(abs(pair)), float(-pair.real / abs(pair))
 
 
-@judge_shapes("resonance", "oil_damper", "zener_mount")
+@more_shapes("resonance", "oil_damper", "zener_mount")
 def resonance(build: Build, shape: str, size: float) -> dict[str, float]:
     """A damper of oil, whose part of the damping goes with the swing; or a mount of rubber, stiffer when it is quick.
 
@@ -78,7 +78,7 @@ def _averaged(t: np.ndarray, force: np.ndarray, every_s: float, share: float) ->
     return y[np.floor(t / every_s + 1e-9).astype(int)]
 
 
-@judge_shapes("sensor_lag", "rc_line", "exponential_mean")
+@more_shapes("sensor_lag", "rc_line", "exponential_mean")
 def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     """A line with resistance and capacity all along, 1/cosh √(2 τ s); or y + 0.4 (F − y), every half time constant.
 
@@ -100,7 +100,7 @@ def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"time_constant": tau}
 
 
-@judge_shapes("force_delay", "takes_turns", "dual_slope")
+@more_shapes("force_delay", "takes_turns", "dual_slope")
 def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
     """Two converters take turns, one of them later; or one integrates and counts down, the longer the more there is.
 
@@ -119,7 +119,7 @@ def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"delay": delay}
 
 
-@judge_shapes("clock_skew", "ages", "loses_ticks")
+@more_shapes("clock_skew", "ages", "loses_ticks")
 def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     """The rate goes on evenly, from 0.6 of the skew to 1.4; or ticks are lost, twice to three times as many in motion.
 
@@ -142,7 +142,7 @@ def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"skew": 1e6 * float(gained(duration)) / duration}
 
 
-@judge_shapes("force_bias", "compressor")
+@more_shapes("force_bias", "compressor")
 def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     """A compressor on the same supply switches every 8 to 25 s, and the zero with it, by a tenth; stated: the mean."""
     rng = build.rng
@@ -152,7 +152,7 @@ def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"bias": bias}
 
 
-@judge_shapes("force_drift", "two_bodies", "heater")
+@more_shapes("force_drift", "two_bodies", "heater")
 def force_drift(build: Build, shape: str, size: float) -> dict[str, float]:
     """A part that warms soon and one that warms late; or a heater that goes on and off, so that it drifts in steps.
 
@@ -175,7 +175,7 @@ def force_drift(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"rate": rate}
 
 
-@judge_shapes("mains_hum", "dimmer")
+@more_shapes("mains_hum", "dimmer")
 def mains_hum(build: Build, shape: str, size: float) -> dict[str, float]:
     """A dimmer lets each half wave through from 50 to 100 degrees on; stated is the amplitude of the first harmonic."""
     rng = build.rng

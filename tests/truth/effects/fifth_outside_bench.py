@@ -1,4 +1,4 @@
-"""The judge's effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""The fifth shapes: effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together.
 """
@@ -12,12 +12,12 @@ from numba import njit
 
 from .fourth_outside_bench import _wandering
 from .outside_bench import _AMPLIFIER, _child
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 from .sensor import _disturb
 from .third_outside_bench import _fades
 
 
-@judge_effect("swapped_blocks", "pairs", "reversed")
+@effect("swapped_blocks", "pairs", "reversed")
 def swapped_blocks(build: Build, shape: str, size: float) -> dict[str, float]:
     """Blocks of samples arrive in the wrong order now and then, and are filed as they come (RFC 4737, reordering).
 
@@ -59,7 +59,7 @@ def _door(t, force, most):
     return kept[: count + 1]
 
 
-@judge_effect("archive", "swinging_door", "sparse")
+@effect("archive", "swinging_door", "sparse")
 def archive(build: Build, shape: str, size: float) -> dict[str, float]:
     """The force comes out of an archive that keeps few points, and is straight between them (Bristol 1990).
 
@@ -90,7 +90,7 @@ def _phase(child: np.random.Generator, duration_s: float, frequency: float, spre
     return lambda t: np.interp(t, grid, turned)
 
 
-@judge_effect("air_hammer", "band", "heavy")
+@effect("air_hammer", "band", "heavy")
 def air_hammer(build: Build, shape: str, size: float) -> dict[str, float]:
     """An air bearing swings by itself under some loads, at 8 to 25 Hz or so (Powell 1970, pneumatic hammer).
 
@@ -111,7 +111,7 @@ def air_hammer(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "frequency": frequency}
 
 
-@judge_effect("carrier_beat", "one", "two")
+@effect("carrier_beat", "one", "two")
 def carrier_beat(build: Build, shape: str, size: float) -> dict[str, float]:
     """Carriers of amplifiers side by side beat, where they are not tied to each other (HBM, carrier frequency).
 
@@ -148,7 +148,7 @@ def _sleeps(force, h, wakes_N, waits_s, takes_s):
     return out
 
 
-@judge_effect("sleep", "slow_reference")
+@effect("sleep", "slow_reference")
 def sleep(build: Build, shape: str, size: float) -> dict[str, float]:
     """To save its battery the amplifier sleeps in air, and after it wakes its gain is not yet what it will be.
 
@@ -162,7 +162,7 @@ def sleep(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"off": off, "takes": takes_s}
 
 
-@judge_effect("charging", "steady", "by_motion")
+@effect("charging", "steady", "by_motion")
 def charging(build: Build, shape: str, size: float) -> dict[str, float]:
     """Charge gathers on a cable and goes off in a spark: the zero climbs, drops, and climbs anew (IEC 61340).
 
