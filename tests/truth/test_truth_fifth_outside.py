@@ -6,20 +6,13 @@ import pytest
 from .effects.fifth_outside_bench import _door, _sleeps
 from .effects.fifth_outside_pad import _withdrawn
 from .effects.fifth_pad import _pressed
-from .effects.registry import EFFECTS
 from .motion import Path
 from .sets import shapes_of
-from .test_truth_cases import CATALOGUE
 from .test_truth_effects import hidden
 from .test_truth_fourth_outside import SIX
 from .test_truth_third_outside import added
 
 HELD = Path(1.0).hold(60.0).motion()  # a spring of 3 N/mm, held at 1 mm of 2
-
-
-def test_they_are_of_the_bench_or_of_the_pad():
-    mine = [id for id in EFFECTS if id not in CATALOGUE and shapes_of(id, "fifth")]
-    assert len(mine) == 11 and all(EFFECTS[id].shapes == () for id in mine)
 
 
 @pytest.mark.parametrize("shape", shapes_of("swapped_blocks", "fifth"))
