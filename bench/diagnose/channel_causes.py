@@ -89,6 +89,8 @@ def hum_cause(line: Line) -> Cause:
     if line.swing:
         names = ("period", "swell", "swell_phase", "wander", "wander_phase")
         return cause_of(hum, hum.form("swinging"), values | dict(zip(names, line.swing, strict=True)))
+    if line.fires_rad:
+        return cause_of(hum, hum.form("dimmed"), values | {"fires": line.fires_rad})
     if line.higher:
         words = {5: "fifth", 7: "seventh"}
         none = {"fifth": 0.0, "seventh": 0.0, "ratio": 0.0}

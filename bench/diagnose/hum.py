@@ -14,7 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize, minimize_scalar
+
+from sim.effects.mains_hum import first_of_dimmed
 
 from .noise import Part
 
@@ -27,6 +29,7 @@ LEVEL = 1e-5  # of a line by chance, over all frequencies
 LEAST_SHARE = 0.002  # of the noise power
 TOLD = 15.0  # times the noise power per sample: what a further number of the line must take
 HARMONICS = (3, 5, 7)
+FIRES = tuple(np.deg2rad(np.arange(10.0, 160.0, 5.0)).tolist())  # angles of a dimmer
 WINDOW_S, FEWEST = 1.0, 20  # in which a line stands still while it swings slowly, and samples that tell of it there
 MOST_GROWTH = 2.0  # of the amplitude, from the least load of the holds to the greatest
 
@@ -36,7 +39,8 @@ class Line:
     """Σ over harmonics (1, 3) of the sines found; `frequency_Hz`, `amplitude_N` and `phase_rad` of the first at t = 0,
     `ratio` and `third_phase_rad` of the third (0 where there is none). All grows by `growth_1_N`, of itself, with each
     newton that the cell bears beyond `at_N`, where the amplitude is as stated. `higher`: (order, ratio, phase) of
-    further harmonics. `swing`: (period in s, swell, its phase, wander in rad, its phase), as in the effect's form."""
+    further harmonics. `swing`: (period in s, swell, its phase, wander in rad, its phase), as in the effect's form.
+    `fires_rad`: the angle from which on half waves are let through, where they are; the phase is the mains' then."""
 
     frequency_Hz: float
     amplitude_N: float
@@ -48,6 +52,7 @@ class Line:
     at_N: float = 0.0
     higher: tuple[tuple[int, float, float], ...] = ()
     swing: tuple[float, ...] = ()
+    fires_rad: float = 0.0
 
     @property
     def of_the_mains(self) -> bool:
@@ -60,6 +65,9 @@ class Line:
         angle = 2.0 * np.pi * self.frequency_Hz * time_s
         swells = self.amplitude_N * (1.0 + self.growth_1_N * (load_N - self.at_N))
         first = angle + self.phase_rad
+        if self.fires_rad:
+            whole = swells / np.hypot(*first_of_dimmed(self.fires_rad))
+            return np.asarray(whole * np.sin(first) * (first % np.pi > self.fires_rad))
         if self.swing:
             period, swell, swell_phase, wander, wander_phase = self.swing
             slow = 2.0 * np.pi * time_s / period
@@ -119,12 +127,33 @@ def find(start_s: float, parts: list[Part], stamp_s: Array, force_N: Array) -> L
         shapes.append(replace(shapes[0], amplitude_N=amplitude * there, growth_1_N=growth / there, at_N=at, higher=()))
     swinging = _swinging(line, parts, start_s)
     shapes += [swinging] if swinging is not None else []
+    shapes += [_dimmed(line, t, e)] if shapes[0].ratio or shapes[0].higher else []
     # the plainest, unless another one takes more than its numbers do by chance
     return min(shapes, key=lambda one: float(np.sum((e - one.force_N(t, load)) ** 2)) + least * _numbers(one))
 
 
 def _numbers(line: Line) -> int:
-    return 2 * (line.ratio > 0.0) + 2 * len(line.higher) + (line.growth_1_N != 0.0) + len(line.swing)
+    own = (line.growth_1_N != 0.0) + (line.fires_rad > 0.0) + len(line.swing)
+    return 2 * (line.ratio > 0.0) + 2 * len(line.higher) + own
+
+
+def _dimmed(line: Line, t: Array, e: Array) -> Line:
+    """The line as a dimmer makes it, which lets each half wave through from an angle on: the one that leaves least."""
+
+    def one(fires: float, more: float = 1.0, later: float = 0.0) -> Line:
+        sine, cosine = first_of_dimmed(fires)
+        phase = line.phase_rad - float(np.arctan2(cosine, sine)) + later
+        return replace(line, amplitude_N=line.amplitude_N * more, phase_rad=phase, fires_rad=fires)
+
+    def left(x: Array) -> float:
+        fires = float(np.clip(x[0], FIRES[0], FIRES[-1]))
+        return float(np.sum((e - one(fires, float(x[1]), float(x[2])).force_N(t, t)) ** 2))
+
+    # what is folded onto the first harmonic has its share in amplitude and phase
+    start = min((np.array([fires, 1.0, 0.0]) for fires in FIRES), key=left)
+    simplex = start + np.vstack([np.zeros(3), np.diag([0.05, 0.1, 0.1])])
+    best = minimize(left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": 200}).x
+    return one(float(np.clip(best[0], FIRES[0], FIRES[-1])), float(best[1]), float(best[2]))
 
 
 def _with_harmonics(line: Line, t: Array, e: Array, least: float, highest: float, spacing: float) -> Line:

@@ -20,6 +20,9 @@
 - `quick`: a neck that bears the more the quicker it is opened: pull_off · ((v_0 + v)/(v_0 + 10 mm/s))^n sin(π/2 ·
   gap/range), v_0 = 0.1 mm/s (D. Maugis, M. Barquins, Fracture mechanics and the adherence of viscoelastic bodies, J.
   Phys. D 11, 1978, 1989–2023). `pull_off` is that at 10 mm/s.
+- `smooth`: −pull_off · q e^(1−q) with q = gap/z, the same on the way in and out: nothing at touch, the most at z, then
+  down again (X.-P. Xu, A. Needleman, Numerical simulations of fast crack growth in brittle solids, J. Mech. Phys.
+  Solids 42, 1994, 1397–1434). z = range/3.146, as q e^(1−q) is 1/e there.
 
 `range` is the gap at which the pull has fallen to 1/e where it ends nowhere, and where it ends otherwise.
 
@@ -34,6 +37,7 @@ from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
 _ROOT = math.expm1(0.5)
+_FALLEN = 3.1461932206205825  # q e^(1 − q) = 1/e, beyond the crest
 _CREEP_MM_S = 0.1
 """Speed of opening below which `quick` falls no further."""
 _NEAR = 0.02
@@ -118,6 +122,13 @@ def quick(dt: float, gap: float, state: State, p: State) -> float:
     state[1] = gap
     hard = ((_CREEP_MM_S + state[2]) / (_CREEP_MM_S + 10.0)) ** p[2]
     return float(-p[0] * state[0] * hard * math.sin(0.5 * math.pi * gap / p[1]))
+
+
+@block
+def smooth(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range)."""
+    q = _FALLEN * gap / p[1]
+    return float(-p[0] * q * math.exp(1.0 - q))
 
 
 _PULL_OFF = Parameter(
@@ -217,6 +228,13 @@ EFFECT = Effect(
             sought=False,
             blocks={"gap": quick},
             state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="smooth",
+            what="nothing at touch, then more, then less, on both ways",
+            parameters=(_PULL_OFF, _RANGE),
+            sought=False,
+            blocks={"gap": smooth},
         ),
     ),
 )

@@ -13,6 +13,9 @@
 - `closing`: what has opened closes again under the preload, within `time_constant`: a nut or joint full of grease, of
   which the film is pressed out (J. Stefan, Versuche über die scheinbare Adhäsion, Sitzungsber. Akad. Wiss. Wien 69,
   1874, 713–735: the thinner the film, the slower; near one thickness, as an exponential).
+- `filled`: a film of oil that motion drags in fills a share of the play, gap · (1 − film · v/(v + v_0)) at speed v (O.
+  Reynolds, On the theory of lubrication, Philos. Trans. R. Soc. Lond. 177, 1886, 157–234: what a film carries grows
+  with its speed). `gap` is the width at rest.
 
 Reference: M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash, a survey, Automatica 38, 2002,
 1633–1649.
@@ -85,6 +88,20 @@ def closing(dt: float, x: float, state: State, p: State) -> float:
     state[1] = x
     state[2] = min(max(opened, 0.0), p[0])
     return x + state[2]
+
+
+@block
+def filled(dt: float, x: float, state: State, p: State) -> float:
+    """Probe side, from x to x + what is open; p = (gap, film, speed). State: started, probe, x, speed."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[1] = x
+    elif dt > 0.0:
+        state[3] = abs(x - state[2]) / dt
+    state[2] = x
+    gap = p[0] * (1.0 - p[1] * state[3] / (state[3] + p[2]))
+    state[1] = min(max(state[1], x), x + gap)
+    return state[1]
 
 
 @block
@@ -163,6 +180,18 @@ EFFECT = Effect(
             ),
             blocks={"play": closing},
             state=(0.0,) * 3,
+        ),
+        Form(
+            name="filled",
+            what="narrower the faster it goes, as a film of oil fills it",
+            parameters=(
+                _GAP,
+                Parameter("film", "1", 0.0, 0.9, 0.3, "share that the film fills at high speed", starts=(0.3,)),
+                Parameter("speed", "mm/s", 0.1, 1e3, 10.0, "at which it fills half of that", starts=(3.0, 20.0)),
+            ),
+            sought=False,
+            blocks={"play": filled},
+            state=(0.0,) * 4,
         ),
         Form(
             name="loaded",

@@ -6,6 +6,8 @@
 - `asperities`: rough faces meet by their summits first, and the load grows exponentially with approach until they are
   flat: δ = s ln(1 + e^((y − offset)/s)), s = roughness · |offset| (J. A. Greenwood, J. B. P. Williamson, Proc. R.
   Soc. A 295, 1966, 300–319, with exponentially distributed heights).
+- `moved`: offset · (1 + share (s(t) − ½)), s a logistic step from 0 to 1 at a time: an axis that is homed anew, a pad
+  that is shifted or a probe put on again during the recording finds the surface a little elsewhere.
 
 With an exponential law a constant offset is exactly another m, and with a polynomial another polynomial.
 
@@ -19,6 +21,8 @@ import math
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
+
+_MOST = 0.3  # of the offset, by which it may change
 
 
 @block
@@ -49,6 +53,13 @@ def asperities(dt: float, y: float, state: State, p: State) -> float:
     if u < -40.0:
         return min(y - p[0], 0.0)
     return s * math.log1p(math.exp(u))
+
+
+@block
+def moved(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below a surface that moves once; p = (offset, share, moved_at, within); state: time."""
+    state[0] += dt
+    return y - p[0] * (1.0 + 0.5 * p[1] * math.tanh((state[0] - p[2]) / p[3]))
 
 
 EFFECT = Effect(
@@ -120,6 +131,38 @@ EFFECT = Effect(
                 ),
             ),
             blocks={"depth": asperities},
+        ),
+        Form(
+            name="moved",
+            what="a little more or less from a time on",
+            parameters=(
+                Parameter(
+                    "offset",
+                    "mm",
+                    -5.0,
+                    5.0,
+                    0.05,
+                    "true surface minus believed surface, the mean of before and after",
+                    required=True,
+                    amplitude=True,
+                    floor=("position_noise_mm", 2.0),
+                ),
+                Parameter(
+                    "share",
+                    "1",
+                    -_MOST,
+                    _MOST,
+                    0.1,
+                    "what there is more of it in the end",
+                    default=0.0,
+                    starts=(-0.1, 0.1),
+                ),
+                Parameter("moved_at", "s", 0.0, 1e6, 30.0, "time at which it moves, from the first sample on"),
+                Parameter("within", "s", 0.02, 60.0, 0.5, "half the time that the move takes"),
+            ),
+            sought=False,
+            blocks={"depth": moved},
+            state=(0.0,),
         ),
     ),
 )

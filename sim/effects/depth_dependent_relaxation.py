@@ -6,8 +6,11 @@
 - `free_volume`: e^(slope · δ/(1 + δ/fading)): rates go with e^(−B/f), and the free volume f with depth (M. L. Williams,
   R. F. Landel, J. D. Ferry, J. Am. Chem. Soc. 77, 1955, 3701–3707).
 - `knee`: 1 + slope · min(δ, knee): linear up to a knee, and even beyond.
+- `beyond`: 1 up to a share `begins` of the reach, and linear from there; `slope` is the mean from the surface to the
+  reach: cells or asperities that must close first (L. J. Gibson, M. F. Ashby, Cellular Solids, 2nd ed., Cambridge
+  University Press, 1997).
 
-All have the relative slope `slope` at the surface.
+All others have the relative slope `slope` at the surface.
 
 Reference: R. A. Schapery, On the characterization of nonlinear viscoelastic materials, Polym. Eng. Sci. 9, 1969,
 295–310 (shift factor that depends on strain).
@@ -58,6 +61,13 @@ def knee(dt: float, depth: float, state: State, p: State) -> float:
     return float(factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0)))
 
 
+@block
+def beyond(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on the rates; p = (slope, begins, reach)."""
+    factor = 1.0 + p[0] * max(depth - p[1] * p[2], 0.0) / (1.0 - p[1])
+    return float(factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0)))
+
+
 _SLOPE = Parameter(
     "slope",
     "1/mm",
@@ -105,6 +115,17 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"rate": knee},
+        ),
+        Form(
+            name="beyond",
+            what="rates linear in depth, from a depth on",
+            parameters=(
+                _SLOPE,
+                Parameter("begins", "1", 0.0, 0.9, 0.4, "share of the reach up to which they are as at the surface"),
+                Parameter("reach", "mm", 1e-3, 1e3, 1.0, "depth to which `slope` is the mean", fixed=True),
+            ),
+            sought=False,
+            blocks={"rate": beyond},
         ),
     ),
 )

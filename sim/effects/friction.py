@@ -26,6 +26,9 @@ since the last reversal, rises with it, and is a continuous function of position
 - `logarithmic`: Prandtl's element whose slider holds F_c (1 + growth ln((v_0 + |v|)/(v_0 + 1 mm/s))), v_0 = 0.1 mm/s:
   polymers creep over what they slide on, and so bear more the quicker they go (B. J. Briscoe, D. Tabor, Friction and
   wear of polymers: the role of mechanical properties, Br. Polym. J. 10, 1978, 74–78). F_c is that at 1 mm/s.
+- `swelling`: Prandtl's element whose slider holds F_c (1 + swell · sin(2π y/turn + angle)), as a guide's balls come
+  into the track and go, one after another (H. Ohta, Y. Kitajima, S. Kato, Y. Igarashi, Effects of ball groupings on
+  ball passage vibrations of a linear guideway type ball bearing, J. Tribol. 129, 2007, 188–193).
 - `one_way`: Prandtl's element whose slider holds F_c (1 + differs) on the way in and F_c (1 − differs) on the way out,
   as of a seal whose lip points one way (B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer, 1991: the
   level depends on the direction). Wherever it slides, this is `coulomb` beside a bias; at the first sample it is none.
@@ -38,6 +41,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.waves import phase
 from sim.jit import State, block
 
 _LAST, _FORCE, _STARTED, _DEPTH = range(4)
@@ -155,6 +159,19 @@ def uneven(dt: float, y: float, state: State, p: State) -> float:
     more = p[1] * math.sin(angle) + p[2] * math.cos(angle) + p[3] * math.sin(2.0 * angle) + p[4] * math.cos(2.0 * angle)
     limit = p[0] * max(1.0 + more, 0.0)
     force = state[_FORCE] + moved * (p[0] / p[6])
+    force = max(-limit, min(limit, force))
+    state[_FORCE] = force
+    return force
+
+
+@block
+def swelling(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element whose limit swells along the way; p = (coulomb, swell, turn, angle, presliding)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    limit = p[0] * (1.0 + p[1] * math.sin(2.0 * math.pi * y / p[2] + p[3]))
+    force = state[_FORCE] + moved * (p[0] / p[4])
     force = max(-limit, min(limit, force))
     state[_FORCE] = force
     return force
@@ -330,6 +347,22 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": uneven},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="swelling",
+            what="more and less again and again along the way, as balls come in and go",
+            parameters=(
+                _COULOMB,
+                Parameter("swell", "1", 0.0, 1.0, 0.2, "how far it swells, of itself", starts=(0.2,)),
+                Parameter(
+                    "turn", "mm", 0.1, 50.0, 1.0, "distance after which it is the same", starts=(0.45, 0.65, 0.95, 1.8)
+                ),
+                phase("angle", "phase of the swell at position 0"),
+                _PRESLIDING,
+            ),
+            sought=False,
+            blocks={"probe": swelling},
             state=(0.0, 0.0, 0.0),
         ),
         Form(

@@ -5,6 +5,8 @@ Phases are at the first sample.
 - `sine`: amplitude · sin(2πft + phase).
 - `harmonics`: with the third harmonic, which rectifiers and saturated transformers make.
 - `flat_topped`: with the third, the fifth and the seventh, as rectifiers make that draw from the crests alone.
+- `dimmed`: a dimmer lets each half wave through from an angle `fires` on (IEC 61000-3-2); `amplitude` is that of the
+  first harmonic, `phase` that of the mains.
 - `swinging`: amplitude and phase swing slowly, amplitude · (1 + swell · sin(2πt/period + …)) ·
   sin(2πft + phase + wander · sin(2πt/period + …)), as the grid's frequency does and what else it feeds.
 - `loaded`, `loaded_harmonics`: the same, times 1 + growth · (F − at_force) of the force F at the cell. A bridge
@@ -20,6 +22,7 @@ chapter 11 (the grid's frequency).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.waves import phase
@@ -48,6 +51,25 @@ def flat_topped(dt: float, force: float, state: State, p: State) -> float:
     angle = 2.0 * math.pi * p[1] * state[0]
     wave = math.sin(angle + p[2]) + p[3] * math.sin(3.0 * angle + p[4])
     return force + p[0] * (wave + p[5] * math.sin(5.0 * angle + p[6]) + p[7] * math.sin(7.0 * angle + p[8]))
+
+
+def first_of_dimmed(fires: float) -> tuple[float, float]:
+    """Sine and cosine of the first harmonic of sin θ where θ mod π > fires, 0 elsewhere."""
+    return 1.0 - (fires - 0.5 * math.sin(2.0 * fires)) / math.pi, -(math.sin(fires) ** 2) / math.pi
+
+
+@block
+def dimmed(dt: float, force: float, state: State, p: State) -> float:
+    """Force with the hum; p = (amplitude of the whole wave, frequency, phase, fires)."""
+    state[0] += dt
+    angle = 2.0 * math.pi * p[1] * state[0] + p[2]
+    return force + p[0] * math.sin(angle) if angle % math.pi > p[3] else force
+
+
+def _whole(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `dimmed` reads."""
+    fires = values["fires"]
+    return (values["amplitude"] / math.hypot(*first_of_dimmed(fires)), values["frequency"], values["phase"], fires)
 
 
 @block
@@ -141,6 +163,20 @@ EFFECT = Effect(
             sought=False,
             blocks={"sensor": flat_topped},
             state=(0.0,),
+        ),
+        Form(
+            name="dimmed",
+            what="half waves that are let through late, as by a dimmer",
+            parameters=(
+                _AMPLITUDE,
+                _FREQUENCY,
+                _PHASE,
+                Parameter("fires", "rad", 0.0, 2.8, 1.3, "angle from which on a half wave is let through"),
+            ),
+            sought=False,
+            blocks={"sensor": dimmed},
+            state=(0.0,),
+            pack=_whole,
         ),
         Form(
             name="swinging",

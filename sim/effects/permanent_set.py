@@ -7,6 +7,9 @@
 - `gradual`: towards set · deepest at a rate in time, only while pressed (the rate is scaled by depth/deepest).
 - `rebounding`: of what sinks at once a share `back` rises again at a rate in time, while nothing presses on it; `set`
   is the mean of what sinks at once and what stays (ISO 1856 and ISO 815 measure a set after a time of recovery).
+- `ratcheting`: by set · deepest · (1 + more · ln N), N how often the probe came near the deepest depth (9/10 of it)
+  from half of it or less: each cycle adds less than the one before (J. L. Chaboche, Time-independent constitutive
+  theories for cyclic plasticity, Int. J. Plast. 2, 1986, 149–188).
 
 `deepest` is in the probe's coordinate; the pad's depth is what is left above the sunken surface.
 
@@ -22,6 +25,7 @@ from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
 
 _DEEPEST, _SUNK, _BACK = range(3)
+_TIMES, _AWAY = 1, 2
 
 
 @block
@@ -74,6 +78,18 @@ def rebounding(dt: float, y: float, state: State, p: State) -> float:
         state[_BACK] *= math.exp(-p[2] * dt)
         state[_BACK] = max(state[_BACK], y - state[_SUNK], 0.0)  # it meets the probe and stops
     return y - state[_SUNK] - state[_BACK]
+
+
+@block
+def ratcheting(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the sunken surface; p = (set, more); state: deepest, times but one, whether it was away."""
+    state[_DEEPEST] = max(state[_DEEPEST], y)
+    if y < 0.5 * state[_DEEPEST]:
+        state[_AWAY] = 1.0
+    elif state[_AWAY] != 0.0 and y > 0.9 * state[_DEEPEST]:
+        state[_AWAY] = 0.0
+        state[_TIMES] += 1.0
+    return float(y - min(p[0] * state[_DEEPEST] * (1.0 + p[1] * math.log1p(state[_TIMES])), state[_DEEPEST]))
 
 
 _SET = Parameter(
@@ -154,6 +170,17 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"depth": rebounding},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="ratcheting",
+            what="at once, and a little more with each cycle",
+            parameters=(
+                _SET,
+                Parameter("more", "1", 0.0, 1.0, 0.15, "what each e-fold of cycles adds", starts=(0.15,)),
+            ),
+            sought=False,
+            blocks={"depth": ratcheting},
             state=(0.0, 0.0, 0.0),
         ),
     ),

@@ -29,3 +29,9 @@ def ramp(up_to: float, n: int, back: bool = True) -> np.ndarray:
     """From 0 to `up_to` in n samples, and back."""
     up = np.linspace(0.0, up_to, n)
     return np.concatenate([up, up[-2::-1]]) if back else up
+
+
+def sense(effect: Active, t: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """What the force path makes of a force at the cell."""
+    plant = Cascade(AIR, [effect]).plant()
+    return np.array([plant.sense(float(d), float(f)) for d, f in zip(np.diff(t, prepend=t[0]), force, strict=True)])

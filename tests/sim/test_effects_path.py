@@ -11,16 +11,10 @@ from scipy.signal import cheb1ap
 from sim.effects import Active, effect
 from sim.effects.draws import uniform
 from sim.pad import Cascade
-from tests.sim.effect_tools import AIR, LINEAR, SOFT, K, active, simulate
+from tests.sim.effect_tools import AIR, LINEAR, SOFT, K, active, sense, simulate
 from tests.sim.test_pad import walk
 
 Array = NDArray[np.float64]
-
-
-def sense(effect: Active, t: Array, force: Array) -> Array:
-    """What the force path makes of a force at the cell."""
-    plant = Cascade(AIR, [effect]).plant()
-    return np.array([plant.sense(float(d), float(f)) for d, f in zip(np.diff(t, prepend=t[0]), force, strict=True)])
 
 
 def sample(effect: Active, force: Array) -> Array:

@@ -261,7 +261,7 @@ def test_a_line_that_grows_with_the_load_is_stated_at_the_mean_force():
         assert np.std(e - line.force_N(t, load)) == pytest.approx(0.01, rel=0.03)
 
 
-@pytest.mark.parametrize("shape", ["sine", "odd harmonics", "swells", "wanders"])
+@pytest.mark.parametrize("shape", ["sine", "odd harmonics", "swells", "wanders", "let through late"])
 def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
     for seed in SEEDS:
         rng = np.random.default_rng(seed)
@@ -271,12 +271,16 @@ def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
         angle = 2 * np.pi * 50.0 * t + (0.4 * slow if shape == "wanders" else 0.0)
         tops = np.sin(3 * angle) / 5 - np.sin(5 * angle + 0.2) / 10 if shape == "odd harmonics" else 0.0
         clean = 0.03 * (swells * np.sin(angle + 0.5) + tops)
+        if shape == "let through late":
+            mains = 2 * np.pi * 50.0 * t + 2.1
+            clean = 0.03 * np.sin(mains) * (mains % np.pi > 1.2)
         e = clean + 0.01 * rng.standard_normal(len(t))
         line = hum.find(0.0, _holds(t, e, 4500), t, e)
         assert line is not None
         assert bool(line.swing) == (shape in ("swells", "wanders"))
         assert [order for order, _, _ in line.higher] == ([5] if shape == "odd harmonics" else [])
         assert line.growth_1_N == 0.0
+        assert line.fires_rad == pytest.approx(1.2 if shape == "let through late" else 0.0, abs=0.05)
         assert np.std(line.force_N(t, np.zeros(len(t))) - clean) < 1.5e-3
 
 

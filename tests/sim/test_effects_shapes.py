@@ -1,0 +1,81 @@
+"""Shapes that a cause takes once it is found: each against its closed form."""
+
+import math
+
+import numpy as np
+from numpy.testing import assert_allclose
+
+from sim.effects.mains_hum import first_of_dimmed
+from sim.elastic import Exponential
+from sim.pad import Cascade, Pad
+from sim.relaxation import Relaxation
+from tests.sim.effect_tools import AIR, GEL, LINEAR, K, active, ramp, sense, simulate
+
+
+def test_a_surface_that_moves_once() -> None:
+    t = np.linspace(0.0, 20.0, 2001)
+    moves = active("contact_offset", "moved", offset=0.1, share=0.2, moved_at=8.0, within=0.05)
+    force = simulate(LINEAR, [moves], t, np.full(t.size, 1.0))
+    assert_allclose(force[[100, 800, 1900]], K * (1.0 - 0.1 * np.array([0.9, 1.0, 1.1])), rtol=1e-9)
+
+
+def test_attraction_that_grows_and_falls_with_the_gap() -> None:
+    pulls = active("adhesion", "smooth", pull_off=0.2, range=0.3)
+    crest = 0.3 / 3.146193
+    x = -np.array([0.0, 0.5 * crest, crest, 0.3, 3.0])
+    force = simulate(LINEAR, [pulls], np.arange(5.0), x)
+    assert_allclose(force, -0.2 * np.array([0.0, 0.5 * math.exp(0.5), 1.0, math.exp(-1.0), 0.0]), atol=1e-7)
+
+
+def test_relaxation_that_changes_from_a_depth_on() -> None:
+    t = np.linspace(0.0, 3.0, 3001)
+    for depth, factor in ((0.7, 1.0), (1.0, 1.0), (2.0, 1.6), (3.0, 2.2)):
+        later = active("depth_dependent_relaxation", "beyond", slope=0.4, begins=1.0 / 3.0, reach=3.0)
+        pad = Pad(Exponential(K, 0.0), GEL, unilateral=True)
+        quick = Pad(Exponential(K, 0.0), Relaxation(GEL.shares, tuple(factor * r for r in GEL.rates)), unilateral=True)
+        x = np.full(t.size, depth)
+        assert_allclose(simulate(pad, [later], t, x), simulate(quick, [], t, x), rtol=1e-9)
+
+
+def test_play_that_a_film_fills_at_speed() -> None:
+    film = active("backlash", "filled", gap=0.1, film=0.4, speed=10.0)
+    x = np.concatenate([np.linspace(0.0, 2.0, 201), np.linspace(2.0, 1.0, 101)[1:]])
+    for step_s, open_mm in ((1e-3, 0.1 * (1 - 0.4 * 10.0 / 20.0)), (1.0, 0.1 * (1 - 0.4 * 0.01 / 10.01))):
+        _, probe = Cascade(LINEAR, [film]).probe(step_s * np.arange(x.size), x)
+        assert_allclose(probe[:201], x[:201], atol=1e-12)
+        assert_allclose(probe[-20:] - x[-20:], open_mm, rtol=1e-6)
+
+
+def test_set_that_grows_with_each_cycle() -> None:
+    x = np.concatenate([ramp(1.0, 101)] * 4)
+    force = simulate(
+        LINEAR, [active("permanent_set", "ratcheting", set=0.1, more=0.2)], np.arange(x.size, dtype=float), x
+    )
+    tops = np.flatnonzero(x == 1.0)
+    assert_allclose(force[tops], K * (1.0 - 0.1 * (1.0 + 0.2 * np.log([1.0, 2.0, 3.0, 4.0]))), rtol=1e-12)
+
+
+def test_friction_that_swells_along_the_way() -> None:
+    swells = active("friction", "swelling", coulomb=0.5, swell=0.3, turn=0.8, angle=0.4, presliding=1e-4)
+    x = np.linspace(0.0, 2.0, 4001)
+    level = 0.5 * (1 + 0.3 * np.sin(2 * math.pi * x / 0.8 + 0.4))
+    force = simulate(AIR, [swells], np.arange(x.size, dtype=float), x)
+    assert_allclose(force[10:], level[10:], rtol=2e-3)
+    back = simulate(AIR, [swells], np.arange(x.size, dtype=float), x[::-1])
+    assert_allclose(back[10:], -level[::-1][10:], rtol=2e-3)
+
+
+def test_hum_of_a_dimmer() -> None:
+    t = np.arange(20_000) * 1e-4
+    for fires in (0.5, 1.3, 2.4):
+        hum = active("mains_hum", "dimmed", amplitude=0.1, frequency=50.0, phase=0.7, fires=fires)
+        out = sense(hum, t, np.zeros(t.size))
+        wave = np.sin(2 * math.pi * 50 * t + 0.7)
+        dark = (2 * math.pi * 50 * t + 0.7) % math.pi < fires
+        assert np.all(out[dark] == 0.0) and np.ptp(out[~dark] / wave[~dark]) < 1e-9
+        assert_allclose(np.abs(np.fft.rfft(out))[100] / 10_000, 0.1, rtol=2e-2)
+        angle = (np.arange(100_000) + 0.5) / 100_000 * 2 * math.pi
+        cut = np.sin(angle) * (angle % math.pi > fires)
+        assert_allclose(
+            first_of_dimmed(fires), [2 * np.mean(cut * np.sin(angle)), 2 * np.mean(cut * np.cos(angle))], atol=1e-4
+        )
