@@ -66,14 +66,14 @@ def test_friction_that_swells_along_the_way() -> None:
 
 
 def test_hum_of_a_dimmer() -> None:
-    t = np.arange(20_000) * 1e-4
+    t = np.arange(20_000) * 1e-5
     for fires in (0.5, 1.3, 2.4):
         hum = active("mains_hum", "dimmed", amplitude=0.1, frequency=50.0, phase=0.7, fires=fires)
         out = sense(hum, t, np.zeros(t.size))
         wave = np.sin(2 * math.pi * 50 * t + 0.7)
         dark = (2 * math.pi * 50 * t + 0.7) % math.pi < fires
         assert np.all(out[dark] == 0.0) and np.ptp(out[~dark] / wave[~dark]) < 1e-9
-        assert_allclose(np.abs(np.fft.rfft(out))[100] / 10_000, 0.1, rtol=2e-2)
+        assert_allclose(np.abs(np.fft.rfft(out))[10] / 10_000, 0.1, rtol=5e-3)
         angle = (np.arange(100_000) + 0.5) / 100_000 * 2 * math.pi
         cut = np.sin(angle) * (angle % math.pi > fires)
         assert_allclose(
