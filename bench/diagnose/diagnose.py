@@ -47,6 +47,7 @@ FAINT = 0.25  # of the noise power, that such a cause takes
 MOST = 0.5  # of what was left, that a cause leaves
 NEARLY_ALL = 0.9  # of the error beyond the noise
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
+UNSEEN = 0.1  # of the noise power: what no test of structure sees of what is left, and the noise may be as well
 FADED = 0.25  # of its size as found
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
@@ -282,6 +283,10 @@ def _concluded(
     swing = _swinging(prepared, residual)
     if swing is not None:
         floor, squares, excess = _apart(prepared, swing, floor, squares, excess)
+    tests = remains(full, residual, whole[1].free, swing)
+    told = [r for r in tests if r.passed]
+    if len(fits) > 1 and not told and excess[-1] < UNSEEN * floor**2:
+        excess = [max(e - excess[-1], 0.0) for e in excess]  # noise, which the holds have told too little of
     channel = channel_causes(m, prepared, flags, before, whole[1])
     apart = sum(c.gain for c in channel)  # still in N²
     scale = excess[0] + apart
@@ -292,8 +297,6 @@ def _concluded(
     least = min(TOLD * scale, SPEAKS * floor**2)
     causes = joined(causes, [replace(c, gain=c.gain / scale) for c in channel if c.gain > least or by_themselves(c)])
     left = excess[-1] / scale if causes and np.isfinite(scale) else 1.0 - sum(c.gain for c in causes)
-    tests = remains(full, residual, whole[1].free, swing)
-    told = [r for r in tests if r.passed]
     if causes:
         verdict = "explained" if explains(left, causes) else "unexplained"
     else:

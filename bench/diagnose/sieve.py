@@ -27,6 +27,7 @@ FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
 FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the least
 HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
+SMALLER = 0.2  # of a size from which the first steps lead astray
 AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
 NEAR = 2.0  # times χ² before: another law that is no farther off after a few steps takes more
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
@@ -197,7 +198,7 @@ class Sieve:
             if np.isfinite(s.promise) and seen < 2 and sum(forms_seen.values()) < STARTS:
                 forms_seen[s.cause.form.name] = seen + 1
                 chosen.append(s)
-        joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen if not s.anew]
+        joined = [self._begun(fit, s.cause, signatures.jacobian) for s in chosen if not s.anew]
         # another law begins beside the fit and not at it: it takes more steps to tell what it is worth
         near = [t is not None and t.cause.form.amend is not None and t.fit.chi2 < NEAR * fit.chi2 for t in joined]
         tried = [self._carried(t, MORE) if close else t for t, close in zip(joined, near, strict=True) if t is not None]
@@ -285,6 +286,16 @@ class Sieve:
         start = best.structure.x(pad, best.structure.values(best.x), best.of_run)
         again = self._solved(best.structure, start, FEW, known)
         return [] if again is None else [again]
+
+    def _begun(self, fit: Fit, cause: Cause, known: Array) -> Trial | None:
+        """A few steps from a start; and from a smaller size of the cause where they leave more than there was without:
+        the size is that of a straight line, on which the pad's numbers, too, may go too far at once."""
+        trial, amplitude = self._joined(fit, cause, FEW, known), cause.amplitude
+        if trial is None or amplitude is None or trial.fit.chi2 <= fit.chi2:
+            return trial
+        size = SMALLER * cause.start[amplitude.name]
+        smaller = self._joined(fit, cause.with_start(**{amplitude.name: size}), FEW, known)
+        return trial if smaller is None or trial.score <= smaller.score else smaller
 
     def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
         structure = fit.structure.with_cause(cause)

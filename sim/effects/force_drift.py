@@ -10,6 +10,7 @@ first sample in all forms.
 - `hyperbolic`: rate · t/(1 + t/τ), as recovery by many processes of which each is slower than the last.
 - `turning`: rate · (2τ/π) sin(πt/2τ), as a room that warms and cools: it turns at τ.
 - `bent`: rate · t until a time, and a share of that rate from there on, as where a door is opened or a heater goes off.
+- `two_bodies`: a share of it settles within τ, the rest within `later` times as long: gauge and body of a cell.
 - `quickening`: rate · t (1 + t/2τ), as a supply that ends: twice as quick at τ.
 
 Reference: OIML R 60, Metrological regulation for load cells (creep, and temperature effect on the dead load output).
@@ -56,6 +57,15 @@ def hyperbolic(dt: float, force: float, state: State, p: State) -> float:
     """To a limit, slowly; p = (rate, time_constant)."""
     state[0] += dt
     return force + p[0] * state[0] / (1.0 + state[0] / p[1])
+
+
+@block
+def two_bodies(dt: float, force: float, state: State, p: State) -> float:
+    """Two exponentials; p = (rate, time_constant, share, later)."""
+    state[0] += dt
+    slow = p[1] * p[3]
+    soon, late = p[1] * math.expm1(-state[0] / p[1]), slow * math.expm1(-state[0] / slow)
+    return force - p[0] * (p[2] * soon + (1.0 - p[2]) * late)
 
 
 @block
@@ -122,6 +132,19 @@ EFFECT = Effect(
             parameters=(_RATE, _time_constant("time in which it is half way")),
             sought=False,
             blocks={"sensor": hyperbolic},
+            state=(0.0,),
+        ),
+        Form(
+            name="two_bodies",
+            what="to a limit, one part soon and one late",
+            parameters=(
+                _RATE,
+                _time_constant("time in which the part that is soon settles"),
+                Parameter("share", "1", 0.0, 1.0, 0.5, "share of the rate that settles soon", starts=(0.5,)),
+                Parameter("later", "1", 2.0, 100.0, 10.0, "how many times as long the rest takes", starts=(10.0,)),
+            ),
+            sought=False,
+            blocks={"sensor": two_bodies},
             state=(0.0,),
         ),
         Form(

@@ -11,6 +11,8 @@ value. Each is exact for a force that is linear between samples, at any spacing.
 - `three_poles`: after Butterworth, 1/((1 + s/ω)(1 + s/ω + s²/ω²)) with ω = 2/τ, which overshoots by 8 %.
 - `chebyshev`: four poles after Chebyshev with a ripple of 0.5 dB, as in front of converters: nearly a delay, and a
   ringing after it.
+- `line`: a line with resistance and capacity all along, 1/cosh √(2τs): poles at 1, 9, 25, 49 times the slowest (W. C.
+  Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948, 55–63).
 - `moving_average`: the mean over the last 2τ.
 - `decimator`: the mean over 2wτ around the time τ ago. With w = 1/√3 delay and width are those of three running means
   in a row, as of a converter's sinc³ decimator (E. B. Hogenauer, IEEE Trans. Acoust. Speech Signal Process. 29, 1981,
@@ -162,6 +164,32 @@ def chebyshev(dt: float, u: float, state: State, p: State) -> float:
     return _A1 * y + _A2 * y2 + p[0] * (_B1 * v + _B2 * v2)
 
 
+_SQUARES = (1.0, 9.0, 25.0, 49.0)
+_LAGS = tuple(1.0 / square / sum(1.0 / other for other in _SQUARES) for square in _SQUARES)
+_PARTS = tuple(
+    math.prod((lag / (lag - other) for other in _LAGS if other != lag), start=1.0) for lag in _LAGS
+)  # partial fractions
+(_T1, _T2, _T3, _T4), (_P1, _P2, _P3, _P4) = _LAGS, _PARTS
+
+
+@block
+def line(dt: float, u: float, state: State, p: State) -> float:
+    """Four poles of a line, side by side; p = (time_constant,). State: last, started, the four."""
+    if state[1] == 0.0 or p[0] <= 0.0:
+        state[1] = 1.0
+        state[2] = u
+        state[3] = u
+        state[4] = u
+        state[5] = u
+    else:
+        state[2] = lagged(dt, state[2], state[0], u, _T1 * p[0])
+        state[3] = lagged(dt, state[3], state[0], u, _T2 * p[0])
+        state[4] = lagged(dt, state[4], state[0], u, _T3 * p[0])
+        state[5] = lagged(dt, state[5], state[0], u, _T4 * p[0])
+    state[0] = u
+    return _P1 * state[2] + _P2 * state[3] + _P3 * state[4] + _P4 * state[5]
+
+
 # moving average: the integral of the force at knots in a ring; (age of the newest, integral, force, time) …
 _AGE, _TOTAL, _FORCE, _NOW, _FIRST, _COUNT, _TAIL = range(7)  # two of the last
 _RING = 8
@@ -295,6 +323,14 @@ EFFECT = Effect(
             parameters=(_TIME_CONSTANT,),
             sought=False,
             blocks={"sensor": chebyshev},
+            state=(0.0,) * 6,
+        ),
+        Form(
+            name="line",
+            what="a long line, with resistance and capacity all along",
+            parameters=(_TIME_CONSTANT,),
+            sought=False,
+            blocks={"sensor": line},
             state=(0.0,) * 6,
         ),
         Form(

@@ -65,6 +65,26 @@ def test_friction_that_swells_along_the_way() -> None:
     assert_allclose(back[10:], -level[::-1][10:], rtol=2e-3)
 
 
+def test_a_line_lags_as_its_hyperbolic_cosine() -> None:
+    tau, slow = 0.02, 2.0 * 0.02 * 4.0 / math.pi**2
+    t = np.linspace(0.0, 0.4, 4001)
+    force = sense(active("sensor_lag", "line", time_constant=tau), t, 3.0 * t)
+    assert_allclose(3.0 * t[-1] - force[-1], 3.0 * tau, rtol=1e-3)
+    odd = 2.0 * np.arange(40) + 1.0
+    # after a jump at the first of two samples all poles of 1/cosh √(2 τ s) die away by themselves
+    jump = sense(active("sensor_lag", "line", time_constant=tau), t, np.where(t > 0.0, 1.0, 0.0))
+    left = sum(4.0 / math.pi * (-1.0) ** k / n * np.exp(-(n**2) * t / slow) for k, n in enumerate(odd))
+    late = t > 0.01
+    assert_allclose(1.0 - jump[late], left[late], atol=0.03)
+
+
+def test_a_drift_of_two_bodies() -> None:
+    t = np.array([0.0, 1e-4, 5.0, 1e6])
+    drift = active("force_drift", "two_bodies", rate=0.02, time_constant=4.0, share=0.3, later=12.0)
+    soon, late = 4.0 * (1.0 - np.exp(-t / 4.0)), 48.0 * (1.0 - np.exp(-t / 48.0))
+    assert_allclose(sense(drift, t, np.zeros(4)), 0.02 * (0.3 * soon + 0.7 * late), atol=1e-12)
+
+
 def test_hum_of_a_dimmer() -> None:
     t = np.arange(20_000) * 1e-5
     for fires in (0.5, 1.3, 2.4):
