@@ -44,8 +44,8 @@ class Start:
 
     cause: Cause
     promise: float
-    anew: bool = False
-    """Whether the pad starts as it was believed: where its refit stands in the cause's place."""
+    pad: Array | None = None
+    """The pad's vector to start from, where its refit stands in the cause's place."""
 
 
 @dataclass(frozen=True)

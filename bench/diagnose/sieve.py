@@ -20,6 +20,7 @@ from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .path import Trial
 from .refit import Fit, extended, force_at, jacobian, refit
+from .spectrum import one_more_mode
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,6 @@ FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
 FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the least
 HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
-SMALLER = 0.2  # of a size from which the first steps lead astray
 AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
 NEAR = 2.0  # times χ² before: another law that is no farther off after a few steps takes more
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
@@ -90,7 +90,7 @@ class Sieve:
             for pair, found in zip(wanted, pool.map(lambda p: starts(signatures, *p), wanted), strict=True):
                 by_id.setdefault(pair[0].id, []).extend(found)
             promising = self._promising(by_id, least) if only is None else list(by_id)
-            for id_, start in self._hidden(fit, [pair for pair in wanted if pair[0].id not in promising]):
+            for id_, start in self._hidden(fit, wanted, promising):
                 by_id[id_].append(start)
                 promising += [] if id_ in promising else [id_]
             self.progress(f"{len(promising)} candidates")
@@ -180,11 +180,16 @@ class Sieve:
         order = sorted((i for i in promise if promise[i] >= least), key=lambda i: -promise[i])
         return order[:WORTH]
 
-    def _hidden(self, fit: Fit, pairs: Sequence[tuple[Effect, Form]]) -> list[tuple[str, Start]]:
-        """Causes whose place a mode of the pad has taken, among those whose signature shows nothing."""
-        rates = self.believed.pad.pad.relaxation.rates
-        causes = [instead_of_a_mode(fit, rates, cause_of(*pair)) for pair in pairs]
-        return [(cause.id, Start(cause, np.inf, anew=True)) for cause in causes if cause is not None]
+    def _hidden(
+        self, fit: Fit, pairs: Sequence[tuple[Effect, Form]], promising: Sequence[str]
+    ) -> list[tuple[str, Start]]:
+        """Causes whose place a mode of the pad has taken, among those whose signature shows nothing; and a mode whose
+        place others have taken."""
+        rates, believed = self.believed.pad.pad.relaxation.rates, self.believed.pad.x()
+        causes = [instead_of_a_mode(fit, rates, cause_of(*pair)) for pair in pairs if pair[0].id not in promising]
+        out = [(cause.id, Start(cause, np.inf, believed)) for cause in causes if cause is not None]
+        more = [one_more_mode(self.short, fit, rates, cause_of(*pair)) for pair in pairs]
+        return [*out, *((cause.id, Start(cause, np.inf, pad)) for cause, pad in (m for m in more if m is not None))]
 
     def _sieved(
         self, fit: Fit, found: list[Start], signatures: Signatures, believed: tuple[Array, Array]
@@ -198,15 +203,15 @@ class Sieve:
             if np.isfinite(s.promise) and seen < 2 and sum(forms_seen.values()) < STARTS:
                 forms_seen[s.cause.form.name] = seen + 1
                 chosen.append(s)
-        joined = [self._begun(fit, s.cause, signatures.jacobian) for s in chosen if not s.anew]
+        joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen if s.pad is None]
         # another law begins beside the fit and not at it: it takes more steps to tell what it is worth
         near = [t is not None and t.cause.form.amend is not None and t.fit.chi2 < NEAR * fit.chi2 for t in joined]
         tried = [self._carried(t, MORE) if close else t for t, close in zip(joined, near, strict=True) if t is not None]
         tried += self._from_believed(tried, *believed)
         for s in chosen:
-            if s.anew:
+            if s.pad is not None:
                 structure = fit.structure.with_cause(s.cause)
-                x = structure.x(believed[0], [*fit.structure.values(fit.x), s.cause.start], fit.of_run)
+                x = structure.x(s.pad, [*fit.structure.values(fit.x), s.cause.start], fit.of_run)
                 again = self._solved(structure, x, MORE, None)
                 tried += [] if again is None else [self._falling(again)]
         return sorted(tried, key=lambda t: t.score)
@@ -286,16 +291,6 @@ class Sieve:
         start = best.structure.x(pad, best.structure.values(best.x), best.of_run)
         again = self._solved(best.structure, start, FEW, known)
         return [] if again is None else [again]
-
-    def _begun(self, fit: Fit, cause: Cause, known: Array) -> Trial | None:
-        """A few steps from a start; and from a smaller size of the cause where they leave more than there was without:
-        the size is that of a straight line, on which the pad's numbers, too, may go too far at once."""
-        trial, amplitude = self._joined(fit, cause, FEW, known), cause.amplitude
-        if trial is None or amplitude is None or trial.fit.chi2 <= fit.chi2:
-            return trial
-        size = SMALLER * cause.start[amplitude.name]
-        smaller = self._joined(fit, cause.with_start(**{amplitude.name: size}), FEW, known)
-        return trial if smaller is None or trial.score <= smaller.score else smaller
 
     def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
         structure = fit.structure.with_cause(cause)
