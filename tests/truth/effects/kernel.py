@@ -32,13 +32,16 @@ class Numbers(NamedTuple):
     stick_keeps: float = 1.0  # share of that tension that is left each time it has let go
     stick_Ns: float = 0.0  # impulse of tension that a film bears
     offset_mm: float = 0.0  # surface below the zero of position
-    # 1 linear, 2 stiffening, 3 softer beyond a preload, 4 Hertz, 5 creeps, 6 slips, 7 root, 8 cubic
+    # 1 linear, 2 stiffening, 3 softer beyond a preload, 4 Hertz, 5 creeps, 6 slips, 7 root, 8 cubic,
+    # 9 with the way
     frame_form: int = 0
     frame_mm_N: float = 0.0
     frame_force_N: float = 1.0
     frame_stiff_share: float = 1.0
     frame_late_share: float = 0.0
     frame_late_s: float = 1.0
+    frame_per_mm: float = 0.0
+    frame_at_mm: float = 0.0
     friction_form: int = 0  # 1 Coulomb, 2 Stribeck, 3 Dahl, 4 LuGre, 5 Maxwell slip
     coulomb_N: float = 0.0
     presliding_mm: float = 1e-3
@@ -61,12 +64,15 @@ class Numbers(NamedTuple):
     set_form: int = 0  # 1 linear, 2 saturating, 3 beyond a yield depth, 4 progressive
     set_mm_mm: float = 0.0
     set_limit_mm: float = 1.0
-    # 1 exponential, 2 snaps off, 3 neck, 4 bridge, 5 van der Waals, 6 bilinear, 7 fibrils, 8 by rate, 9 smooth, 10 tack
+    # 1 exponential, 2 snaps off, 3 neck, 4 bridge, 5 van der Waals, 6 bilinear, 7 fibrils, 8 by rate, 9 smooth,
+    # 10 tack, 11 by depth, 12 strands
     adhesion_form: int = 0
     pull_off_N: float = 0.0
     adhesion_mm: float = 1.0
     adhesion_s: float = 1.0
-    # 1 linear, 2 with depth, 3 thinning, 4 thickening, 5 Eyring, 6 one-sided, 7 √depth, 8 load, 9 squeeze, 10 flow
+    adhesion_depth_mm: float = 1.0
+    # 1 linear, 2 with depth, 3 thinning, 4 thickening, 5 Eyring, 6 one-sided, 7 √depth, 8 load, 9 squeeze, 10 flow,
+    # 11 stiffness
     damping_form: int = 0
     damping_Ns_mm: float = 0.0
     damping_ref: float = 1.0
@@ -94,6 +100,14 @@ def _law(table, depth, step):
     left, right = table[i], table[i + 1]
     a, b = s * s * (3 - 2 * s), s * (1 - s)
     return left[0] * (1 - a) + right[0] * a + step * b * ((1 - s) * left[1] - s * right[1])
+
+
+@njit(cache=True)
+def _slope(table, depth, step):
+    n = table.shape[0]
+    i = min(int(depth / step), n - 2)
+    s = min(depth / step - i, 1.0)
+    return table[i, 1] + s * (table[i + 1, 1] - table[i, 1])
 
 
 @njit(cache=True)
@@ -187,6 +201,8 @@ def _damped(p, table, speed, depth):
         return p.damping_Ns_mm * speed / max(1 - depth / p.damping_ref, 0.2) ** 3
     if p.damping_form == 10:
         return p.damping_Ns_mm * speed * (1 + abs(speed) / p.damping_ref)
+    if p.damping_form == 11:
+        return p.damping_Ns_mm * speed * _slope(table, depth, p.table_mm) / p.damping_ref
     exponent = 0.7 if p.damping_form == 3 else 1.3
     return math.copysign(p.damping_Ns_mm * p.damping_ref * (abs(speed) / p.damping_ref) ** exponent, speed)
 
@@ -223,7 +239,7 @@ def _friction(p, slips, dx, new):
 
 
 @njit(cache=True)
-def _deflection(p, force, late, new):
+def _deflection(p, force, place, late, new):
     if p.frame_form == 2:
         return math.copysign(p.frame_mm_N * p.frame_force_N * math.log1p(abs(force) / p.frame_force_N), force)
     if p.frame_form == 3 and force <= p.frame_force_N:
@@ -246,6 +262,8 @@ def _deflection(p, force, late, new):
     if p.frame_form == 8:  # y + y³ = F/F_0
         y = 2 / math.sqrt(3.0) * math.sinh(math.asinh(1.5 * math.sqrt(3.0) * force / p.frame_force_N) / 3)
         return p.frame_mm_N * p.frame_force_N * y
+    if p.frame_form == 9:
+        return p.frame_mm_N * (1 + p.frame_per_mm * (place - p.frame_at_mm)) * force
     return p.frame_mm_N * force
 
 
@@ -321,6 +339,8 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
         gap = 0.0 if touching and depth > 0 else max(new[_S] - depth, 0.0)
         if gap == 0.0 and p.adhesion_form == 10:
             new[_ATTACHED] = 1 - (1 - state[_ATTACHED]) * math.exp(-p.step_s / p.adhesion_s)
+        elif gap == 0.0 and p.adhesion_form == 11:
+            new[_ATTACHED] = max(state[_ATTACHED], min(depth / p.adhesion_depth_mm, 1.0))
         elif gap == 0.0:
             new[_ATTACHED] = 1.0
         elif gap > p.adhesion_mm:
@@ -337,6 +357,9 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
         elif new[_ATTACHED] > 0 and p.adhesion_form == 8:
             quick = 1 + 10 * max(state[_X] - x, 0.0) / p.step_s  # 1 + v/0.1 mm/s; 101 at 10 mm/s
             force -= p.pull_off_N * math.sin(0.5 * math.pi * gap / p.adhesion_mm) * (quick / 101) ** 0.15
+        elif new[_ATTACHED] > 0 and p.adhesion_form == 12:
+            share = gap / p.adhesion_mm  # four alike, which break at 0.4, 0.6, 0.8 and 1
+            force -= p.pull_off_N * share / 1.8 * min(4.0, math.ceil(5 * (1 - share)))
         elif new[_ATTACHED] > 0 and p.adhesion_form == 6:
             force -= p.pull_off_N * min(4 * gap, (p.adhesion_mm - gap) * 4 / 3) / p.adhesion_mm
         elif new[_ATTACHED] > 0 and p.adhesion_form == 4:
@@ -389,7 +412,7 @@ def run(p, table, c, nu, behind_mm, felt_N, height_mm, gain, rate_factor):
         if j == 1 or p.rate_form or rate_factor[j] != rate_factor[j - 1]:
             _rates(p, nu, rate_factor[j], state[_S], e, k)
         y = behind_mm[j]
-        x = y if p.frame_form == 0 else y - _deflection(p, cell[j - 1], late, new_late)
+        x = y if p.frame_form == 0 else y - _deflection(p, cell[j - 1], y, late, new_late)
         low, high = -1e9, 1e9
         x_last = r_last = 0.0
         for turn in range(80):
@@ -397,7 +420,7 @@ def run(p, table, c, nu, behind_mm, felt_N, height_mm, gain, rate_factor):
             total = force + felt_N[j] + _friction(p, slips, x - state[_X], new_slips)
             if p.frame_form == 0:
                 break
-            left = x - y + _deflection(p, total, late, new_late)
+            left = x - y + _deflection(p, total, y, late, new_late)
             if abs(left) < 1e-10 or high - low < 1e-12:
                 break
             if left > 0:
