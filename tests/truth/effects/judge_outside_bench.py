@@ -38,13 +38,13 @@ def chip(build: Build, shape: str, size: float) -> dict[str, float]:
     """A chip between the cell's live and dead end bears a part of what is beyond a force, each time beyond another.
 
     `moves`: it is shaken about in air and bears from 0.1 to 0.7 of the greatest force on. `comes_and_goes`: from 0.15
-    to 0.3 on, in half of the touches.
+    to 0.3 on, in one of each two touches.
     """
     rng, most = build.rng, build.force_N
     bears, begins, child = 0.28 * size * spread(rng, 0.8, 1.25), float(rng.uniform(0.15, 0.3)), _child(rng)
     levels, there = most * child.uniform(0.1, 0.7, 1024), np.ones(1024)
     if shape == "comes_and_goes":
-        levels, there = np.full(1024, most * begins), (child.random(1024) < 0.5).astype(float)
+        levels, there = np.full(1024, most * begins), np.ravel(child.permuted(np.tile([0.0, 1.0], (512, 1)), axis=1))
 
     def stage(t, force):
         touch = _loadings(force, 0.03 * most, 0.01 * most) % 1024
@@ -56,10 +56,11 @@ def chip(build: Build, shape: str, size: float) -> dict[str, float]:
 
 @njit(cache=True)
 def _holds_peak(force, h, tau):
-    """Follows at once as it rises; as it falls, sinks towards nothing by itself and no faster."""
+    """Follows at once as it rises; as it falls, sinks towards nothing, or what is below it, and no faster."""
     out, y, kept = force.copy(), force[0], np.exp(-h / tau)
     for k in range(1, force.shape[0]):
-        y = max(force[k], y * kept) if y > 0 else force[k]
+        end = min(force[k], 0.0)
+        y = max(force[k], end + (y - end) * kept)
         out[k] = y
     return out
 

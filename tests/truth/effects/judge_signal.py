@@ -130,8 +130,8 @@ def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
 def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     """Right as long as it has its reference, then free; or a parabola, as the room warms, in no column of its own.
 
-    `holdover`: for the first tenth to third of the recording. `tuning_fork`: the rate goes from a fifth of its mean or
-    so up to twice of it. Stated is the mean over the recording.
+    `holdover`: for the first tenth to third of the recording. `tuning_fork`: the rate goes from an eighth to a quarter
+    of its mean up to twice of it or more. Stated is the mean over the recording.
     """
     rng, duration = build.rng, build.plant.duration_s
     skew = float(rng.choice([-1.0, 1.0])) * 200e-6 * size * spread(rng, 0.6, 1.6)
