@@ -261,6 +261,6 @@ def viscous_damping(build: Build, shape: str, size: float) -> dict[str, float]:
         told = {"damping_form": 11, "damping_ref": stiffness, "damping_Ns_mm": coefficient}
     else:
         # c v (1 + |v|/v_0) with a v_0 that is next to nothing.
-        told = {"damping_form": 10, "damping_ref": 0.02, "damping_Ns_mm": coefficient * 0.02 / 20.0}
+        told = {"damping_form": 10, "damping_ref": 0.002, "damping_Ns_mm": coefficient * 0.002 / 20.0}
     build.plant.numbers.update(told)
     return {"coefficient": coefficient}
