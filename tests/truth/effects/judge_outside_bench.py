@@ -21,14 +21,13 @@ from .third_outside_bench import _fades
 
 
 @njit(cache=True)
-def _loadings(force, high, low):
-    """How often the force has come above `high` from below `low` so far."""
-    out, count, below = np.zeros(force.shape[0], dtype=np.int64), 0, True
+def _relieved(force, share, least):
+    """How often the force has fallen to a share of the peak since it did so last; peaks below `least` do not count."""
+    out, count, peak = np.zeros(force.shape[0], dtype=np.int64), 0, 0.0
     for k in range(force.shape[0]):
-        if force[k] < low:
-            below = True
-        elif below and force[k] > high:
-            below, count = False, count + 1
+        peak = max(peak, force[k])
+        if peak > least and force[k] < share * peak:
+            count, peak = count + 1, force[k]
         out[k] = count
     return out
 
@@ -37,18 +36,19 @@ def _loadings(force, high, low):
 def chip(build: Build, shape: str, size: float) -> dict[str, float]:
     """A chip between the cell's live and dead end bears a part of what is beyond a force, each time beyond another.
 
-    `moves`: it is shaken about in air and bears from 0.1 to 0.7 of the greatest force on. `comes_and_goes`: from 0.15
-    to 0.3 on, in one of each two touches.
+    It shifts as it is relieved by a third. `moves`: it bears from 0.1 to 0.7 of the greatest force on.
+    `comes_and_goes`: from 0.15 to 0.3 on, one of two times.
     """
     rng, most = build.rng, build.force_N
-    bears, begins, child = 0.28 * size * spread(rng, 0.8, 1.25), float(rng.uniform(0.15, 0.3)), _child(rng)
+    bears, begins, child = 0.23 * size * spread(rng, 0.8, 1.25), float(rng.uniform(0.15, 0.3)), _child(rng)
     levels, there = most * child.uniform(0.1, 0.7, 1024), np.ones(1024)
     if shape == "comes_and_goes":
         levels, there = np.full(1024, most * begins), np.ravel(child.permuted(np.tile([0.0, 1.0], (512, 1)), axis=1))
+        there[0] = 1.0
 
     def stage(t, force):
-        touch = _loadings(force, 0.03 * most, 0.01 * most) % 1024
-        return force - min(bears, 0.8) * there[touch] * np.maximum(force - levels[touch], 0.0)
+        place = _relieved(force, 2 / 3, 0.03 * most) % 1024
+        return force - min(bears, 0.8) * there[place] * np.maximum(force - levels[place], 0.0)
 
     build.sensor(_CELL, stage)
     return {"bears": bears}
@@ -115,7 +115,7 @@ def whipping_hose(build: Build, shape: str, size: float) -> dict[str, float]:
     `by_speed`: the faster the more. `any_move`: in any move as much. The greatest swing is the amplitude.
     """
     rng, motion, step_s = build.rng, build.plant.motion, 1e-3
-    amplitude, frequency = 0.07 * size * build.force_N * spread(rng, 0.8, 1.25), spread(rng, 4.0, 10.0)
+    amplitude, frequency = 0.06 * size * build.force_N * spread(rng, 0.8, 1.25), spread(rng, 4.0, 10.0)
     calms_s, child = spread(rng, 0.3, 1.0), _child(rng)
     grid = np.arange(0.0, build.plant.duration_s + 1.0, step_s)
     speed = np.abs(motion.velocity(grid))
@@ -135,7 +135,7 @@ def levelling(build: Build, shape: str, size: float) -> dict[str, float]:
     `hunts`: up and down alike, each for 1 to 4 s. `bleeds`: it sinks for 2 to 5 s and is lifted within 0.3 s.
     """
     rng = build.rng
-    deviation, child = 0.05 * size * build.depth_mm * spread(rng, 0.8, 1.25), _child(rng)
+    deviation, child = 0.04 * size * build.depth_mm * spread(rng, 0.8, 1.25), _child(rng)
     count = 2 * int(np.ceil(build.plant.duration_s + 10))
     lengths = child.uniform(1.0, 4.0, count)
     if shape == "bleeds":

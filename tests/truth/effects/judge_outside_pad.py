@@ -38,12 +38,12 @@ def _skin(depth, h, breaks_mm, wears_mm, dries_s):
 
 @judge_effect("crust", "brittle", "wears")
 def crust(build: Build, shape: str, size: float) -> dict[str, float]:
-    """In air a crust dries on the pad and bears with it, until it breaks; it takes 1 to 4 s to come back.
+    """In air a crust dries on the pad and bears with it, until it breaks; it takes 0.4 to 1.5 s to come back.
 
     `brittle`: it breaks at 0.4 to 0.6 of the depth. `wears`: it is rubbed off within 1 to 2 depths of way.
     """
     rng, depth_mm = build.rng, build.depth_mm
-    more, dries_s = 0.3 * size * build.force_N / depth_mm * spread(rng, 0.8, 1.25), spread(rng, 1.0, 4.0)
+    more, dries_s = 0.3 * size * build.force_N / depth_mm * spread(rng, 0.8, 1.25), spread(rng, 0.4, 1.5)
     breaks, wears = depth_mm * float(rng.uniform(0.4, 0.6)), depth_mm * spread(rng, 1.0, 2.0)
     breaks, wears = (breaks, np.inf) if shape == "brittle" else (np.inf, wears)
 
@@ -58,21 +58,21 @@ def crust(build: Build, shape: str, size: float) -> dict[str, float]:
 def avalanches(build: Build, shape: str, size: float) -> dict[str, float]:
     """At rest the pad gives way by jumps at random, of many sizes; the next move fills up what is missing.
 
-    `omori`: less and less often, by one over the time since the move. `even`: one in 0.8 s or so, whenever.
+    `omori`: less and less often, by one over the time since the move. `even`: one in 3 s or so, whenever.
     """
     rng, motion = build.rng, build.plant.motion
-    drop, child = (0.045 if shape == "omori" else 0.04) * size * spread(rng, 0.8, 1.25), _child(rng)
+    drop, child = 0.06 * size * spread(rng, 0.8, 1.25), _child(rng)
     at = motion.breaks_s
     moves = np.abs(motion.velocity((at[1:] + at[:-1]) / 2)) > 1e-6
     begins = at[:-1][moves & ~np.concatenate([[False], moves[:-1]])]
     ends = at[1:][moves & ~np.concatenate([moves[1:], [False]])]
     rests = list(zip(ends, np.append(begins[1:], build.plant.duration_s + 10), strict=True))
-    often, soon_s = 0.6, 0.05
+    often, soon_s = 0.25, 0.05
     when, sizes = [], []
     for end, until in rests:
         # As many as fit: by K ln(1 + s/c), or by the time.
         counted = np.cumsum(child.exponential(1.0, 200))
-        later = soon_s * np.expm1(np.minimum(counted / often, 40.0)) if shape == "omori" else 0.8 * counted
+        later = soon_s * np.expm1(np.minimum(counted / often, 40.0)) if shape == "omori" else 3.0 * counted
         later = later[end + later < until]
         when.append(end + later)
         sizes.append(child.exponential(1.0, 200)[: len(later)])
@@ -98,7 +98,8 @@ def squirming(build: Build, shape: str, size: float) -> dict[str, float]:
     """
     rng = build.rng
     deviation, takes_s, child = 0.09 * size * spread(rng, 0.8, 1.25), spread(rng, 0.5, 2.0), _child(rng)
-    ways, along = child.uniform(-np.sqrt(3), np.sqrt(3), 1024), _wandering(child, build.plant.duration_s, 2 * takes_s)
+    ways = child.choice([-1.0, 1.0], 1024) * child.uniform(0.6, 1.4, 1024)
+    along = _wandering(child, build.plant.duration_s, 2 * takes_s)
 
     def gain(t, x):
         pressed = np.cumsum(x > 0) * (t[1] - t[0])
@@ -122,7 +123,7 @@ def tremor(build: Build, shape: str, size: float) -> dict[str, float]:
     deviation, frequency = 0.05 * size * spread(rng, 0.8, 1.25), float(rng.uniform(7.0, 12.0))
     lasts_s, takes_s, child = spread(rng, 0.5, 1.5), spread(rng, 1.0, 3.0), _child(rng)
     waves = [_wandering(child, build.plant.duration_s, lasts_s, step_s) for _ in range(2)]
-    more = 1.0 if shape == "steady" else 1.8
+    more = 1.0 if shape == "steady" else 1.5
 
     def gain(t, x):
         angle = 2 * np.pi * frequency * t
@@ -172,17 +173,17 @@ def _presses(x, beyond_mm, back_mm):
 
 @judge_effect("two_states", "push_push", "at_random")
 def two_states(build: Build, shape: str, size: float) -> dict[str, float]:
-    """A shell inside turns over when it is pressed beyond 0.4 to 0.6 of the depth, and stays so until the next time.
+    """A shell inside turns over when it is pressed beyond 0.35 to 0.5 of the depth, and stays so until the next time.
 
     Stiffer one way than the other. `push_push`: each time. `at_random`: half of the times.
     """
     rng, depth_mm = build.rng, build.depth_mm
-    differs, beyond = 0.12 * size * spread(rng, 0.8, 1.25), depth_mm * float(rng.uniform(0.4, 0.6))
+    differs, beyond = 0.12 * size * spread(rng, 0.8, 1.25), depth_mm * float(rng.uniform(0.35, 0.5))
     turned = np.arange(4096) % 2 if shape == "push_push" else np.cumsum(_child(rng).random(4096) < 0.5) % 2
     turned[0] = 0
 
     def gain(t, x):
-        return np.clip(1 - differs * turned[_presses(x, beyond, 0.3 * depth_mm) % 4096], 0.2, 1.0)
+        return np.clip(1 - differs * turned[_presses(x, beyond, 0.7 * beyond) % 4096], 0.2, 1.0)
 
     build.plant.gain.append(gain)
     return {"differs": differs, "beyond": beyond}
