@@ -1,4 +1,4 @@
-"""Which of a pad's relaxation modes is the missing one: a refit deals the modes out as it comes upon them."""
+"""Which part of a pad's relaxation is the missing one: a refit deals it out as it comes upon it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,82 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from sim.relaxation import Relaxation
 
-from .numbers import Structure
-from .refit import Fit
+from .data import Data
+from .numbers import Cause, Structure
+from .refit import Fit, refit
 
 Array = NDArray[np.float64]
+
+NAMED = "missing_relaxation_mode"
+SEEN = 5e-3  # of the force: differences of relaxation that count
+DEALT = 0.3  # e-folds that believed shares and rates may be off, where nothing else tells
+TIMES = 60
+RATES = 6  # from which a spectrum is begun
+STEPS = 10  # of the fit from there
+
+
+def as_believed(short: Data, fit: Fit) -> Fit | None:
+    """The fit with its relaxation dealt out anew between pad and missing spectrum, the pad's part as near as can be to
+    what was believed: a broad spectrum can take over modes of the pad, and a mode of the pad the spectrum's place.
+    None where there is no spectrum, or no room.
+    """
+    structure = fit.structure
+    index = next((k for k, cause in enumerate(structure.causes) if cause.id == NAMED), None)
+    own = structure.pad.pad.relaxation
+    if index is None or own.order == 0:
+        return None
+    values, cause, order = structure.values(fit.x), structure.causes[index], own.order
+    end, names = len(structure.pad.coordinates), [p.name for p in cause.fitted]
+    pad, amend = structure.pad.at(fit.x[:end]), cause.form.amend
+    assert amend is not None
+    times = np.geomspace(0.3 * float(np.median(np.diff(short.time_s))), 3.0 * float(np.ptp(short.time_s)), TIMES)
+    wanted, centre = _relaxed(amend(pad, values[index]).relaxation, times), np.log([*own.shares, *own.rates])
+
+    def dealt(x: Array) -> tuple[Relaxation, dict[str, float]]:
+        numbers = np.exp(x[: 2 * order]).tolist()
+        return Relaxation(tuple(numbers[:order]), tuple(numbers[order:])), _told(cause, names, x[2 * order :])
+
+    def error(x: Array) -> Array:
+        relaxation, told = dealt(x)
+        if sum(relaxation.shares) + told["share"] >= 1.0:
+            return np.full(TIMES + 2 * order, 1e3)
+        off = _relaxed(amend(replace(pad, relaxation=relaxation), told).relaxation, times) - wanted
+        return np.concatenate([off / SEEN, (x[: 2 * order] - centre) / DEALT])
+
+    tried = []
+    room = max(0.05, 0.9 * (1.0 - sum(own.shares)))
+    for rate in (values[index]["rate"], *(1.0 / times[:: TIMES // RATES]).tolist()):
+        begun = values[index] | {"rate": rate, "share": min(values[index]["share"], room)}
+        start = np.concatenate([centre, np.log([max(begun[name], 1e-6) for name in names])])
+        if np.isfinite(start).all() and error(start).max() < 1e3:
+            tried.append(least_squares(error, start, max_nfev=60))
+    if not tried:
+        return None
+    relaxation, told = dealt(min(tried, key=lambda one: float(one.cost)).x)
+    numbers = replace(structure.pad, pad=replace(pad, relaxation=relaxation))
+    values[index] = {**values[index], **told}
+    x = np.clip(structure.x(numbers.x(), values, fit.of_run), structure.lower, structure.upper)
+    x[: end - 2 * order] = fit.x[: end - 2 * order]
+    return refit(short, structure, x, STEPS, 1e-8)
+
+
+def _told(cause: Cause, names: list[str], x: Array) -> dict[str, float]:
+    """Numbers of a cause at logarithms, within their bounds."""
+    bounds = {p.name: (p.lower, p.upper) for p in cause.fitted}
+    values = zip(names, np.exp(x).tolist(), strict=True)
+    return {**cause.start, **{name: min(max(v, bounds[name][0]), bounds[name][1]) for name, v in values}}
+
+
+def _relaxed(relaxation: Relaxation, times_s: Array) -> Array:
+    """What is left of the force after these times."""
+    out = np.ones(len(times_s))
+    for share, rate in zip(relaxation.shares, relaxation.rates, strict=True):
+        out += share * np.expm1(-rate * times_s)
+    return out
 
 
 def missing_told(fit: Fit, believed: Structure) -> Array:
@@ -21,7 +90,7 @@ def missing_told(fit: Fit, believed: Structure) -> Array:
     """
     structure = fit.structure
     for index, cause in enumerate(structure.causes):
-        if cause.id != "missing_relaxation_mode" or cause.form.name != cause.effect.forms[0].name:
+        if cause.id != NAMED or cause.form.name != cause.effect.forms[0].name:
             continue
         wanted = np.sort(np.log(believed.pad.pad.relaxation.rates))
         values = structure.values(fit.x)

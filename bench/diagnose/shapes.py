@@ -13,7 +13,8 @@ from sim.effects import Form
 
 from .candidates import CHANNEL, Reach, combinations, narrowed
 from .data import Data
-from .modes import missing_told
+from .modes import NAMED as MISSING
+from .modes import as_believed, missing_told
 from .numbers import Structure, cause_of
 from .refit import Fit, force_at, refit
 
@@ -23,6 +24,7 @@ STEPS, STARTS = 8, 12  # of the fit of another shape
 FEW, TRIED = 3, 2  # steps of the best starts
 NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
+AS_GOOD = 4.0  # Δχ² by which one that is near to what was believed may be worse
 EDGE = 1e-6  # within which a coordinate is at its bound
 WORKERS = 2
 
@@ -91,7 +93,11 @@ def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
     lead = taken = replace(lead, x=missing_told(lead, lead.structure))
     for index in range(own, len(kept)):
         members = families(short, taken, [index])[0]
+        dealt = as_believed(short, taken) if taken.structure.causes[index].id == MISSING else None
+        count = len(members)
+        members += [] if dealt is None else families(short, dealt, [index])[0]
         score = scores(short, members)
+        score[count:] -= AS_GOOD
         for best in np.argsort(score, kind="stable").tolist():
             if best == 0:
                 break

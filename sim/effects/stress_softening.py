@@ -11,6 +11,9 @@ The factor on F^e depends on depth δ and on the deepest depth so far; loading b
 - `root`: e^(−a √(deepest − δ)), with a by which the share is gone at twice `depth`: much of it close below the deepest
   point (A. E. Zúñiga, M. F. Beatty, A new phenomenological model for stress-softening in elastomers, Z. Angew. Math.
   Phys. 53, 2002, 794–814). One number, too.
+- `hyperbola`: 1 − share · q/(1 + q) with q = (deepest − δ)/(0.6 depth): it levels off late (J. Diani, B. Fayolle, P.
+  Gilormini, A review on the Mullins effect, Eur. Polym. J. 45, 2009, 601–612, on such functions). 0.6 of it makes half
+  of the share go about where it has in `exponential`.
 - `preconditioned`: as `exponential`, on a pad that had been pressed to `already` before the data begin.
 - `linear`: 1 − share · min(1, (deepest − δ)/(2 depth)): as in `exponential`, `depth` is the mean distance at which it
   goes.
@@ -100,6 +103,15 @@ def root(dt: float, depth: float, state: State, p: State) -> float:
 def _steepness(values: Mapping[str, float]) -> tuple[float, ...]:
     """What `root` reads."""
     return (-math.log1p(-values["share"]) / math.sqrt(2.0 * values["depth"]), values["already"])
+
+
+@block
+def hyperbola(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (share, depth, already)."""
+    here = max(depth, 0.0)
+    state[0] = max(state[0], here, p[2])
+    below = state[0] - here
+    return 1.0 - p[0] * below / (below + 0.6 * p[1])
 
 
 @block
@@ -206,6 +218,14 @@ EFFECT = Effect(
             blocks={"elastic": root},
             state=(0.0,),
             pack=_steepness,
+        ),
+        Form(
+            name="hyperbola",
+            what="softer with the distance below the deepest point, levelling off late",
+            parameters=(_SHARE, _DEPTH, _ALREADY),
+            sought=False,
+            blocks={"elastic": hyperbola},
+            state=(0.0,),
         ),
         Form(
             name="preconditioned",

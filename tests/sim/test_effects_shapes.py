@@ -55,6 +55,13 @@ def test_set_that_grows_with_each_cycle() -> None:
     assert_allclose(force[tops], K * (1.0 - 0.1 * (1.0 + 0.2 * np.log([1.0, 2.0, 3.0, 4.0]))), rtol=1e-12)
 
 
+def test_softening_that_levels_off_late() -> None:
+    softens = active("stress_softening", "hyperbola", share=0.4, depth=0.5)
+    x = np.array([0.0, 0.5, 2.0, 1.7, 1.4, 0.5, 2.0])
+    left = [1.0, 1.0, 1.0, 0.8, 1.0 - 0.4 * 2.0 / 3.0, 1.0 - 0.4 * 5.0 / 6.0, 1.0]
+    assert_allclose(simulate(LINEAR, [softens], np.arange(7.0), x), K * x * np.array(left), rtol=1e-12)
+
+
 def test_friction_that_swells_along_the_way() -> None:
     swells = active("friction", "swelling", coulomb=0.5, swell=0.3, turn=0.8, angle=0.4, presliding=1e-4)
     x = np.linspace(0.0, 2.0, 4001)
