@@ -32,7 +32,7 @@ from .shapes import reshaped
 from .spread import covariance
 from .swing import Swing
 from .swing import find as swinging
-from .verdict import chain, excesses, explains, found, ordered, sureness, without
+from .verdict import chain, excesses, explains, found, ordered, seen, sureness, without
 from .write import model_of
 
 Array = NDArray[np.float64]
@@ -47,7 +47,6 @@ FAINT = 0.25  # of the noise power, that such a cause takes
 MOST = 0.5  # of what was left, that a cause leaves
 NEARLY_ALL = 0.9  # of the error beyond the noise
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
-UNSEEN = 0.1  # of the noise power: what no test of structure sees of what is left, and the noise may be as well
 FADED = 0.25  # of its size as found
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
@@ -285,8 +284,8 @@ def _concluded(
         floor, squares, excess = _apart(prepared, swing, floor, squares, excess)
     tests = remains(full, residual, whole[1].free, swing)
     told = [r for r in tests if r.passed]
-    if len(fits) > 1 and not told and excess[-1] < UNSEEN * floor**2:
-        excess = [max(e - excess[-1], 0.0) for e in excess]  # noise, which the holds have told too little of
+    if len(fits) > 1 and not told:
+        excess = seen(excess, floor)
     channel = channel_causes(m, prepared, flags, before, whole[1])
     apart = sum(c.gain for c in channel)  # still in N²
     scale = excess[0] + apart

@@ -18,6 +18,7 @@ from .search import Search
 
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
+UNSEEN = 0.1  # of the noise power: what no test of structure sees of what is left, and the noise may be as well
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
 
@@ -71,6 +72,13 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
         if taken > max(SURELY * chance, CRUMB * floor_N**2):
             out[k] = max(out[k], out[k + 1] + taken)
     return squares, out
+
+
+def seen(excess: Sequence[float], floor_N: float) -> list[float]:
+    """Excesses over the noise, N², where no test of structure sees anything in what is left: little of that is noise
+    too, of which the holds have told too little."""
+    left = excess[-1] if excess[-1] < UNSEEN * floor_N**2 else 0.0
+    return [max(e - left, 0.0) for e in excess]
 
 
 def _square_std(prepared: Prepared, fit: Fit) -> float:

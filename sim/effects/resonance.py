@@ -8,6 +8,9 @@ The damping ratio ends at 0.5: beyond, a second-order low-pass has next to no pe
 - `transmitted`: the damper stands beside the spring and bears too, (2ζω s + ω²)/(s² + 2ζω s + ω²). It comes no later
   than a ramp in the end.
 - `amplifier`: a pole at `ratio` times ω comes after the mode, as of an amplifier whose bandwidth is not far above it.
+- `mounted`: on a mount of rubber, the damper of which has a spring behind it (Zener's solid): a pole at `ratio` times ω
+  and a zero at (ratio + 2ζ) ω beside the mode (J. E. Ruzicka, T. F. Derby, Influence of Damping in Vibration Isolation,
+  SVM-7, 1971).
 - `pair`: the rest passes another mode of the same damping, at `ratio` times the frequency.
 - `antiresonance`: zeros at `ratio` times the frequency and of the same damping, where a part of the structure absorbs
   the motion of the rest.
@@ -94,6 +97,27 @@ def amplifier(dt: float, u: float, state: State, p: State) -> float:
     state[_LAST] = u
     share = 1.0 / (1.0 - 2.0 * p[1] * p[2] + p[2] * p[2])
     return y + share * (after - y - p[2] / omega * speed)
+
+
+@block
+def mounted(dt: float, u: float, state: State, p: State) -> float:
+    """Force after the mode, a pole at ratio · ω and a zero: `amplifier` and its speed over the zero's frequency."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_LAST] = u
+        state[_AFTER] = u
+    omega = 2.0 * math.pi * p[0]
+    y, speed = exact(dt, state[_Y], state[_SPEED], state[_LAST], u, omega, p[1])
+    after = first_order(dt, state[_AFTER], state[_LAST], u, 1.0 / (p[2] * omega))
+    state[_Y] = y
+    state[_SPEED] = speed
+    state[_AFTER] = after
+    state[_LAST] = u
+    share = 1.0 / (1.0 - 2.0 * p[1] * p[2] + p[2] * p[2])
+    change = omega * (omega * (u - y) - 2.0 * p[1] * speed)  # of the speed
+    rate = speed + share * (p[2] * omega * (u - after) - speed - p[2] / omega * change)
+    return y + share * (after - y - p[2] / omega * speed) + rate / ((p[2] + 2.0 * p[1]) * omega)
 
 
 @block
@@ -209,6 +233,18 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"sensor": amplifier},
+            state=(0.0,) * 5,
+        ),
+        Form(
+            name="mounted",
+            what="the mode on a mount of rubber",
+            parameters=(
+                _FREQUENCY,
+                _DAMPING,
+                Parameter("ratio", "1", 0.2, 5.0, 1.0, "rate at which the mount relaxes over the natural frequency"),
+            ),
+            sought=False,
+            blocks={"sensor": mounted},
             state=(0.0,) * 5,
         ),
         Form(

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 from numpy.testing import assert_allclose
+from scipy.signal import lsim
 
 from sim.effects.mains_hum import first_of_dimmed
 from sim.elastic import Exponential
@@ -53,6 +54,19 @@ def test_set_that_grows_with_each_cycle() -> None:
     )
     tops = np.flatnonzero(x == 1.0)
     assert_allclose(force[tops], K * (1.0 - 0.1 * (1.0 + 0.2 * np.log([1.0, 2.0, 3.0, 4.0]))), rtol=1e-12)
+
+
+def test_a_mount_of_rubber_rings_as_its_equation_has_it() -> None:
+    frequency, damping, ratio = 30.0, 0.12, 0.8
+    omega = 2.0 * math.pi * frequency
+    pole = ratio * omega
+    zero = pole + 2.0 * damping * omega
+    poles = np.polymul([1.0, pole], [1.0, 2.0 * damping * omega, omega**2])
+    t = np.linspace(0.0, 0.3, 3001)
+    force = np.interp(t, [0.0, 0.05, 0.06, 0.3], [0.0, 0.0, 2.0, 2.0])
+    _, wanted, _ = lsim((np.array([1.0 / zero, 1.0]) * pole * omega**2, poles), force, t)
+    mount = active("resonance", "mounted", frequency=frequency, damping_ratio=damping, ratio=ratio)
+    assert_allclose(sense(mount, t, force), wanted, atol=1e-6)
 
 
 def test_softening_that_levels_off_late() -> None:

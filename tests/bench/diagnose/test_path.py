@@ -166,6 +166,12 @@ def test_a_misfit_is_not_taken_for_noise_however_it_scatters(monkeypatch):
     assert verdict.excesses(prepared, fits, 1.0)[1] == pytest.approx([np.mean(left**2) - 1.0])
 
 
+def test_where_no_test_sees_structure_a_little_over_the_noise_is_noise():
+    assert verdict.seen([0.5, 0.07], 1.0) == pytest.approx([0.43, 0.0])
+    assert verdict.seen([0.5, 0.2, 0.07], 1.0) == pytest.approx([0.43, 0.13, 0.0])
+    assert verdict.seen([2.0, 0.4], 1.0) == [2.0, 0.4]  # the holds tell the noise better than that
+
+
 @pytest.mark.parametrize(
     ("excess", "sure", "goes"),
     [

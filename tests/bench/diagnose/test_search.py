@@ -42,6 +42,17 @@ def test_a_form_whose_valley_is_apart_from_the_best_ones_is_found(seed):
     assert trial.fit.chi2 < 1.1 * search.expected
 
 
+@pytest.mark.parametrize("seed", [1, 3, 9])
+def test_a_missing_mode_is_found_though_the_others_have_spread_over_its_place(seed):
+    """From where too few modes have ended, steps along one more of them lead far away."""
+    c = draw_case(seed, ("missing_relaxation_mode",), 2.5, "log_normal", protocol="staircase", rate_hz=150.0,
+                  jitter="none", own_clock=False)  # fmt: skip
+    search, base = begun(c)
+    trial = search.ranked(base)[0]
+    assert trial.id == "missing_relaxation_mode"
+    assert trial.fit.chi2 < 1.1 * search.expected
+
+
 @pytest.mark.parametrize("seed", [1, 3])
 def test_another_law_is_told_by_the_form_of_few_numbers(seed):
     """Its numbers lean on each other: a few steps from where it resembles the fit do not say what it is worth."""

@@ -12,12 +12,14 @@ from bench.diagnose import spread
 from bench.diagnose.channel import faults, not_of_the_motion
 from bench.diagnose.data import Prepared, prepare
 from bench.diagnose.diagnose import believed_structure
+from bench.diagnose.modes import as_believed
 from bench.diagnose.numbers import Coordinate, cause_of
 from bench.diagnose.refit import Fit, onto, refit
 from bench.diagnose.shapes import departed, reshaped
 from bench.diagnose.spread import covariance, of_the_noise
 from sim.effects import effect
 from sim.model import Model
+from sim.relaxation import Relaxation
 from tests.bench.diagnose.small import measurement
 from tests.truth.cases import Case, draw_case
 
@@ -61,6 +63,26 @@ def test_another_shape_that_fits_better_takes_its_place(id: str, shape: str, for
     assert again.structure.causes[0].form.name == better
     true = c.truth.parameters[id][name]
     assert abs(stated(replace(again, spread=None), name)[0] / true - 1) < 0.1
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_a_spectrum_gives_back_the_mode_of_the_pad_whose_place_it_has(seed: int) -> None:
+    _, p, right = fitted("missing_relaxation_mode", "stretched", "stretched", 2.5, seed, protocol="random_steps")
+    structure, values = right.structure, right.structure.values(right.x)
+    end = len(structure.pad.coordinates)
+    pad, believed = structure.pad.at(right.x[:end]), structure.pad.pad.relaxation
+    shares, rates = list(pad.relaxation.shares), list(pad.relaxation.rates)
+    shares[0], values[0]["share"] = min(values[0]["share"], 0.9 - sum(shares[1:])), shares[0]
+    rates[0], values[0]["rate"] = values[0]["rate"], rates[0]
+    changed = replace(structure.pad, pad=replace(pad, relaxation=Relaxation(tuple(shares), tuple(rates))))
+    x = structure.x(changed.x(), [values[0] | {"stretch": 0.95}], right.of_run)
+    swapped = refit(p.short, structure, x, 25, 1e-8)
+    dealt = as_believed(p.short, swapped)
+    assert dealt is not None
+    far, near = (
+        np.log(structure.pad.at(f.x[:end]).relaxation.rates) - np.log(believed.rates) for f in (swapped, dealt)
+    )
+    assert np.max(np.abs(near)) < 0.5 < np.max(np.abs(far))
 
 
 def test_the_best_shape_stays() -> None:
