@@ -14,6 +14,9 @@ The factor on F^e depends on depth δ and on the deepest depth so far; loading b
 - `hyperbola`: 1 − share · q/(1 + q) with q = (deepest − δ)/(0.6 depth): it levels off late (J. Diani, B. Fayolle, P.
   Gilormini, A review on the Mullins effect, Eur. Polym. J. 45, 2009, 601–612, on such functions). 0.6 of it makes half
   of the share go about where it has in `exponential`.
+- `healing`: as `exponential`, with a deepest depth that is forgotten towards the depth at hand, within `time_constant`:
+  rest gives back what was lost (J. A. C. Harwood, L. Mullins, A. R. Payne, Stress softening in natural rubber
+  vulcanizates, J. Appl. Polym. Sci. 9, 1965, 3011–3021).
 - `preconditioned`: as `exponential`, on a pad that had been pressed to `already` before the data begin.
 - `linear`: 1 − share · min(1, (deepest − δ)/(2 depth)): as in `exponential`, `depth` is the mean distance at which it
   goes.
@@ -112,6 +115,14 @@ def hyperbola(dt: float, depth: float, state: State, p: State) -> float:
     state[0] = max(state[0], here, p[2])
     below = state[0] - here
     return 1.0 - p[0] * below / (below + 0.6 * p[1])
+
+
+@block
+def healing(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (share, depth, time_constant)."""
+    here = max(depth, 0.0)
+    state[0] = max(here + (state[0] - here) * math.exp(-dt / p[2]), here)
+    return 1.0 + p[0] * math.expm1(-(state[0] - here) / p[1])
 
 
 @block
@@ -225,6 +236,17 @@ EFFECT = Effect(
             parameters=(_SHARE, _DEPTH, _ALREADY),
             sought=False,
             blocks={"elastic": hyperbola},
+            state=(0.0,),
+        ),
+        Form(
+            name="healing",
+            what="softer with the distance below a deepest point that rest makes forget",
+            parameters=(
+                _SHARE,
+                _DEPTH,
+                Parameter("time_constant", "s", 0.5, 1e4, 30.0, "time in which it is forgotten", starts=(10.0, 40.0)),
+            ),
+            blocks={"elastic": healing},
             state=(0.0,),
         ),
         Form(

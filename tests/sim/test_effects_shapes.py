@@ -76,6 +76,16 @@ def test_softening_that_levels_off_late() -> None:
     assert_allclose(simulate(LINEAR, [softens], np.arange(7.0), x), K * x * np.array(left), rtol=1e-12)
 
 
+def test_softening_that_rest_takes_back() -> None:
+    heals = active("stress_softening", "healing", share=0.4, depth=0.5, time_constant=8.0)
+    t = np.array([0.0, 1.0, 1.0, 5.0, 17.0])
+    x = np.array([0.0, 2.0, 1.0, 1.0, 1.0])
+    below = np.exp(-np.array([0.0, 4.0, 16.0]) / 8.0)
+    force = simulate(LINEAR, [heals], t, x)
+    assert_allclose(force[2:], K * (1.0 + 0.4 * np.expm1(-below / 0.5)), rtol=1e-9)
+    assert_allclose(force[1], K * 2.0)
+
+
 def test_friction_that_swells_along_the_way() -> None:
     swells = active("friction", "swelling", coulomb=0.5, swell=0.3, turn=0.8, angle=0.4, presliding=1e-4)
     x = np.linspace(0.0, 2.0, 4001)
