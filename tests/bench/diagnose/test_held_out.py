@@ -1,0 +1,33 @@
+"""What a model predicts of blocks that it has not seen; data of the independent simulator."""
+
+from __future__ import annotations
+
+from bench.diagnose import held_out
+from bench.diagnose.channel import faults, not_of_the_motion
+from bench.diagnose.data import prepare
+from bench.diagnose.diagnose import believed_structure
+from bench.diagnose.held_out import held_out_square
+from bench.diagnose.numbers import cause_of
+from bench.diagnose.refit import onto, refit
+from sim.effects import effect
+from sim.model import Model
+from tests.bench.diagnose.small import measurement
+from tests.truth.cases import draw_case
+
+
+def test_a_block_with_the_greatest_forces_is_not_predicted_by_a_limit_that_the_others_make_up(monkeypatch):
+    worse = []
+    for seed in range(4):
+        c = draw_case(seed, ("saturation",), 0.12, "soft", protocol="staircase", rate_hz=150.0, jitter="none")
+        m = measurement(c)
+        p = prepare(m, not_of_the_motion(m, faults(m.force_N)).good)
+        structure, limit = believed_structure(Model.from_dict(c.believed), p), c.truth.parameters["saturation"]["limit"]
+        soft = cause_of(effect("saturation"), effect("saturation").form("soft"), {"limit": limit, "sharpness": 20.0})
+        joined = structure.with_cause(soft)
+        fit = onto(refit(p.short, joined, joined.x(structure.pad.x()), 60, 1e-9), p.full)
+        monkeypatch.setattr(held_out, "AT_THE_TOP", "saturation")
+        known = held_out_square(p, fit)
+        assert known < 1.2 * p.floor_N**2
+        monkeypatch.setattr(held_out, "AT_THE_TOP", "nothing")
+        worse.append(held_out_square(p, fit) / known)
+    assert sum(w > 1.5 for w in worse) >= 2, worse
