@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -39,7 +40,8 @@ def as_believed(short: Data, fit: Fit) -> Fit | None:
     pad, amend = structure.pad.at(fit.x[:end]), cause.form.amend
     assert amend is not None
     times = np.geomspace(0.3 * float(np.median(np.diff(short.time_s))), 3.0 * float(np.ptp(short.time_s)), TIMES)
-    wanted, centre = _relaxed(amend(pad, values[index]).relaxation, times), np.log([*own.shares, *own.rates])
+    wanted = _relaxed(amend(pad, values[index]).relaxation, times)
+    centre = np.log(np.maximum([*own.shares, *own.rates], 1e-9))
 
     def dealt(x: Array) -> tuple[Relaxation, dict[str, float]]:
         numbers = np.exp(x[: 2 * order]).tolist()
@@ -92,13 +94,10 @@ def missing_told(fit: Fit, believed: Structure) -> Array:
     for index, cause in enumerate(structure.causes):
         if cause.id != NAMED or cause.form.name != cause.effect.forms[0].name:
             continue
-        wanted = np.sort(np.log(believed.pad.pad.relaxation.rates))
         values = structure.values(fit.x)
         pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
         modes = [*zip(pad.relaxation.shares, pad.relaxation.rates, strict=True), _mode(values[index])]
-        rates = np.log([rate for _, rate in modes])
-        away = [float(np.sum((np.sort(np.delete(rates, j)) - wanted) ** 2)) for j in range(len(modes))]
-        best = int(np.argmin(away))
+        best = left_over([float(np.log(rate)) for _, rate in modes], np.log(believed.pad.pad.relaxation.rates))
         if best == len(modes) - 1 or sum(share for share, _ in modes) >= 1.0:
             return fit.x
         share, rate = modes.pop(best)
@@ -108,6 +107,13 @@ def missing_told(fit: Fit, believed: Structure) -> Array:
         dealt = replace(structure.pad, pad=replace(pad, relaxation=relaxation))
         return structure.x(dealt.x(), values, fit.of_run)
     return fit.x
+
+
+def left_over(logs: Sequence[float], believed: Array) -> int:
+    """Which of some modes has no place among those believed, by the logarithms of their rates."""
+    wanted = np.sort(believed)
+    away = [float(np.sum((np.sort(np.delete(np.array(logs), j)) - wanted) ** 2)) for j in range(len(logs))]
+    return int(np.argmin(away))
 
 
 def _mode(values: dict[str, float]) -> tuple[float, float]:

@@ -18,12 +18,12 @@ from scipy.optimize import lsq_linear
 from sim.relaxation import Relaxation
 
 from .data import Data
-from .numbers import Cause, PadNumbers, Structure
+from .modes import NAMED, left_over
+from .numbers import Cause
 from .refit import Fit, force_at, jacobian
 
 Array = NDArray[np.float64]
 
-NAMED = "missing_relaxation_mode"
 RATES = 24
 UNIT = 0.05  # share by which the force of a mode is made
 PRESSED = 0.02  # of the greatest force: where the pad bears for sure
@@ -65,18 +65,14 @@ def one_more_mode(data: Data, fit: Fit, believed_rates: Sequence[float], cause: 
     if len(peaks) < order + 1 or total <= 0.0:
         return None
     shares = [share * min(1.0, MOST / total) for share, _ in peaks]
-    own = _left_over([at for _, at in peaks], np.sort(np.log(believed_rates)))
+    own = left_over([at for _, at in peaks], np.log(believed_rates))
     others = sorted((k for k in range(len(peaks)) if k != own), key=lambda k: -peaks[k][1])
     relaxation = Relaxation(tuple(shares[k] for k in others), tuple(float(np.exp(peaks[k][1])) for k in others))
     begun = cause.with_start(share=shares[own], rate=float(np.exp(peaks[own][1])))
-    numbers: PadNumbers = replace(structure.pad, pad=replace(pad, relaxation=relaxation))
+    numbers = replace(structure.pad, pad=replace(pad, relaxation=relaxation))
     x = numbers.x()
     x[: len(law)] = law + found[: len(law)]
-    return begun, np.clip(x, *_bounds(structure, end))
-
-
-def _bounds(structure: Structure, end: int) -> tuple[Array, Array]:
-    return structure.lower[:end], structure.upper[:end]
+    return begun, np.clip(x, structure.lower[:end], structure.upper[:end])
 
 
 def _merged(shares: Array, logs: Array, count: int) -> list[tuple[float, float]]:
@@ -88,9 +84,3 @@ def _merged(shares: Array, logs: Array, count: int) -> list[tuple[float, float]]
         (c, at), (d, other) = peaks[k : k + 2]
         peaks[k : k + 2] = [(c + d, (c * at + d * other) / (c + d))]
     return peaks
-
-
-def _left_over(logs: Sequence[float], wanted: Array) -> int:
-    """Which of the modes has no place among those believed (ascending)."""
-    away = [float(np.sum((np.sort(np.delete(np.array(logs), j)) - wanted) ** 2)) for j in range(len(logs))]
-    return int(np.argmin(away))
