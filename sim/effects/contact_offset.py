@@ -62,6 +62,11 @@ def moved(dt: float, y: float, state: State, p: State) -> float:
     return y - p[0] * (1.0 + 0.5 * p[1] * math.tanh((state[0] - p[2]) / p[3]))
 
 
+def _offset(what: str, least_mm: float = -5.0) -> Parameter:
+    floor = ("position_noise_mm", 2.0)
+    return Parameter("offset", "mm", least_mm, 5.0, 0.05, what, required=True, amplitude=True, floor=floor)
+
+
 EFFECT = Effect(
     id="contact_offset",
     what="The true surface is not where touch-off has put it.",
@@ -72,54 +77,20 @@ EFFECT = Effect(
         Form(
             name="constant",
             what="all depths are off by the same",
-            parameters=(
-                Parameter(
-                    "offset",
-                    "mm",
-                    -5.0,
-                    5.0,
-                    0.05,
-                    "true surface minus believed surface",
-                    required=True,
-                    amplitude=True,
-                    floor=("position_noise_mm", 2.0),
-                ),
-            ),
+            parameters=(_offset("true surface minus believed surface"),),
             blocks={"depth": constant},
         ),
         Form(
             name="toe",
             what="a soft beginning: the offset is lost over the first part of the way",
-            parameters=(
-                Parameter(
-                    "offset",
-                    "mm",
-                    0.0,
-                    5.0,
-                    0.05,
-                    "way lost before contact is whole",
-                    required=True,
-                    amplitude=True,
-                    floor=("position_noise_mm", 2.0),
-                ),
-            ),
+            parameters=(_offset("way lost before contact is whole", 0.0),),
             blocks={"depth": toe},
         ),
         Form(
             name="asperities",
             what="summits of a rough face touch first",
             parameters=(
-                Parameter(
-                    "offset",
-                    "mm",
-                    -5.0,
-                    5.0,
-                    0.05,
-                    "true surface, of the flattened summits, minus believed surface",
-                    required=True,
-                    amplitude=True,
-                    floor=("position_noise_mm", 2.0),
-                ),
+                _offset("true surface, of the flattened summits, minus believed surface"),
                 Parameter(
                     "roughness",
                     "1",
@@ -136,17 +107,7 @@ EFFECT = Effect(
             name="moved",
             what="a little more or less from a time on",
             parameters=(
-                Parameter(
-                    "offset",
-                    "mm",
-                    -5.0,
-                    5.0,
-                    0.05,
-                    "true surface minus believed surface, the mean of before and after",
-                    required=True,
-                    amplitude=True,
-                    floor=("position_noise_mm", 2.0),
-                ),
+                _offset("true surface minus believed surface, the mean of before and after"),
                 Parameter(
                     "share",
                     "1",

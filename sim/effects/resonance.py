@@ -28,6 +28,7 @@ Studies Press, 2000, chapter 2 (modes side by side, antiresonances).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.linear import first_order
@@ -82,26 +83,10 @@ def transmitted(dt: float, u: float, state: State, p: State) -> float:
 
 @block
 def amplifier(dt: float, u: float, state: State, p: State) -> float:
-    """Force after the mode and a pole at ratio · ω, by partial fractions; p = (frequency, damping_ratio, ratio)."""
-    if state[_STARTED] == 0.0:
-        state[_STARTED] = 1.0
-        state[_Y] = u
-        state[_LAST] = u
-        state[_AFTER] = u
-    omega = 2.0 * math.pi * p[0]
-    y, speed = exact(dt, state[_Y], state[_SPEED], state[_LAST], u, omega, p[1])
-    after = first_order(dt, state[_AFTER], state[_LAST], u, 1.0 / (p[2] * omega))
-    state[_Y] = y
-    state[_SPEED] = speed
-    state[_AFTER] = after
-    state[_LAST] = u
-    share = 1.0 / (1.0 - 2.0 * p[1] * p[2] + p[2] * p[2])
-    return y + share * (after - y - p[2] / omega * speed)
+    """Force after the mode and a pole at ratio · ω, by partial fractions, and so much of its rate in time.
 
-
-@block
-def mounted(dt: float, u: float, state: State, p: State) -> float:
-    """Force after the mode, a pole at ratio · ω and a zero: `amplifier` and its speed over the zero's frequency."""
+    p = (frequency, damping_ratio, ratio, s of the rate).
+    """
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
         state[_Y] = u
@@ -117,7 +102,18 @@ def mounted(dt: float, u: float, state: State, p: State) -> float:
     share = 1.0 / (1.0 - 2.0 * p[1] * p[2] + p[2] * p[2])
     change = omega * (omega * (u - y) - 2.0 * p[1] * speed)  # of the speed
     rate = speed + share * (p[2] * omega * (u - after) - speed - p[2] / omega * change)
-    return y + share * (after - y - p[2] / omega * speed) + rate / ((p[2] + 2.0 * p[1]) * omega)
+    return y + share * (after - y - p[2] / omega * speed) + p[3] * rate
+
+
+def _alone(values: Mapping[str, float]) -> tuple[float, ...]:
+    """A pole without a zero."""
+    return (values["frequency"], values["damping_ratio"], values["ratio"], 0.0)
+
+
+def _mounted(values: Mapping[str, float]) -> tuple[float, ...]:
+    """A pole and the zero of a mount."""
+    frequency, damping, ratio = values["frequency"], values["damping_ratio"], values["ratio"]
+    return (frequency, damping, ratio, 1.0 / (2.0 * math.pi * frequency * (ratio + 2.0 * damping)))
 
 
 @block
@@ -234,6 +230,7 @@ EFFECT = Effect(
             sought=False,
             blocks={"sensor": amplifier},
             state=(0.0,) * 5,
+            pack=_alone,
         ),
         Form(
             name="mounted",
@@ -244,8 +241,9 @@ EFFECT = Effect(
                 Parameter("ratio", "1", 0.2, 5.0, 1.0, "rate at which the mount relaxes over the natural frequency"),
             ),
             sought=False,
-            blocks={"sensor": mounted},
+            blocks={"sensor": amplifier},
             state=(0.0,) * 5,
+            pack=_mounted,
         ),
         Form(
             name="pair",
