@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,14 @@ def joined(causes: Sequence[CauseFound], channel: Sequence[CauseFound]) -> list[
         at = next((k for k, other in enumerate(out) if other.gain < cause.gain), len(out))
         out.insert(at, cause)
     return out
+
+
+def merged(causes: Sequence[CauseFound], channel: Sequence[CauseFound]) -> tuple[list[CauseFound], list[CauseFound]]:
+    """Causes of a model and those of the channel, where both have one: the model's, as the channel's, with what both
+    take. A model tells more of a channel's ceiling than the samples do that are at it."""
+    both = {c.id: c for c in causes} if channel else {}
+    told = [replace(both[c.id], gain=both[c.id].gain + c.gain) if c.id in both else c for c in channel]
+    return [c for c in causes if c.id not in {t.id for t in channel}], told
 
 
 def by_themselves(cause: CauseFound) -> bool:

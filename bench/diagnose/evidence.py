@@ -121,9 +121,9 @@ def _inside(p: Parameter, value: float) -> bool:
 
 
 def _ends(fit: Fit, prepared: Prepared) -> bool:
-    """Whether a limit shows in more than a sample or two, or in one that no noise puts there."""
+    """Whether a limit shows in more than a sample or two, left out or not, or in one that no noise puts there."""
     full, at = prepared.full, prepared.at
-    beyond = beyond_limit(full, fit)[at] & (full.weight[at] > 0)
+    beyond = beyond_limit(full, fit)[at]
     if np.count_nonzero(beyond) >= FEWEST:
         return True
     unlimited = force_at(full, *reduced(fit, len(fit.structure.causes) - 1))

@@ -30,6 +30,7 @@ FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the
 HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
 AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
 NEAR = 2.0  # times χ² before: another law that is no farther off after a few steps takes more
+KNEES = ("soft",)  # forms that say more than that the greatest forces are at a ceiling
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
 WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
@@ -79,7 +80,7 @@ class Sieve:
         wanted = [
             pair
             for pair in forms(fit.structure, fit.structure.in_air, self.reach)
-            if (only is None or pair[0].id in only) and pair[0].id not in self.known
+            if (only is None or pair[0].id in only) and (pair[0].id not in self.known or pair[1].name in KNEES)
         ]
         self.progress(f"signatures of {len(wanted)} shapes")
         by_id: dict[str, list[Start]] = {}

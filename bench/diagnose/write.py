@@ -46,7 +46,7 @@ def model_of(believed: Model, fit: Fit, prepared: Prepared, limit_N: float | Non
                 position += 1
             row[p.name] = quantity
         effects.append(row)
-    if limit_N is not None:
+    if limit_N is not None and all(row["id"] != "saturation" for row in effects):
         effects.append({"id": "saturation", "limit": {"value": abs(limit_N), "unit": "N"}})
     if effects:
         content["effects"] = effects

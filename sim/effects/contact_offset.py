@@ -63,8 +63,9 @@ def moved(dt: float, y: float, state: State, p: State) -> float:
 
 
 def _offset(what: str, least_mm: float = -5.0) -> Parameter:
-    floor = ("position_noise_mm", 2.0)
-    return Parameter("offset", "mm", least_mm, 5.0, 0.05, what, required=True, amplitude=True, floor=floor)
+    return Parameter(
+        "offset", "mm", least_mm, 5.0, 0.05, what, required=True, amplitude=True, floor=("position_noise_mm", 2.0)
+    )
 
 
 EFFECT = Effect(

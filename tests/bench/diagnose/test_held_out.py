@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bench.diagnose import held_out
+from bench.diagnose import diagnose, held_out
 from bench.diagnose.channel import faults, not_of_the_motion
 from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import believed_structure
@@ -31,3 +31,17 @@ def test_a_block_with_the_greatest_forces_is_not_predicted_by_a_limit_that_the_o
         monkeypatch.setattr(held_out, "AT_THE_TOP", "nothing")
         worse.append(held_out_square(p, fit) / known)
     assert sum(w > 1.5 for w in worse) >= 2, worse
+
+
+def test_a_ceiling_that_bends_the_force_towards_it_is_one_cause():
+    """What the samples at the ceiling do not tell, the model does: how the force bends below it."""
+    for seed in range(2):
+        c = draw_case(seed, ("saturation",), 2.0, "rapp", protocol="staircase", rate_hz=150.0, jitter="none")
+        found = diagnose(measurement(c), Model.from_dict(c.believed))
+        assert [cause.id for cause in found.causes] == ["saturation"] and found.verdict == "explained"
+        limit = found.causes[0].parameters["limit"].value
+        assert abs(limit / c.truth.parameters["saturation"]["limit"] - 1) < 0.02
+        assert found.held_out_after < 1.1 * found.noise_floor
+        assert [effect["id"] for effect in found.model_dict["effects"]] == ["saturation"]
+        true, flagged = c.truth.flags["saturated"], found.flags["saturation"]
+        assert (true & flagged).sum() > 0.9 * max(true.sum(), flagged.sum())
