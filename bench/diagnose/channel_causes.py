@@ -56,20 +56,19 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
 
 
 def joined(causes: Sequence[CauseFound], channel: Sequence[CauseFound]) -> list[CauseFound]:
-    """Causes of a model in their order, and those of the channel, each before the first that takes less than it."""
-    out = list(causes)
-    for cause in sorted(channel, key=lambda c: c.gain, reverse=True):
+    """Causes of a model in their order, and those of the channel, each before the first that takes less than it.
+
+    A cause that both have is the model's, with what both take, in the channel's place: a model tells more of a ceiling
+    than the samples do that are at it.
+    """
+    modelled = {c.id: c for c in causes}
+    told = [replace(modelled[c.id], gain=modelled[c.id].gain + c.gain) if c.id in modelled else c for c in channel]
+    ids = {c.id for c in told}
+    out = [c for c in causes if c.id not in ids]
+    for cause in sorted(told, key=lambda c: c.gain, reverse=True):
         at = next((k for k, other in enumerate(out) if other.gain < cause.gain), len(out))
         out.insert(at, cause)
     return out
-
-
-def merged(causes: Sequence[CauseFound], channel: Sequence[CauseFound]) -> tuple[list[CauseFound], list[CauseFound]]:
-    """Causes of a model and those of the channel, where both have one: the model's, as the channel's, with what both
-    take. A model tells more of a channel's ceiling than the samples do that are at it."""
-    both = {c.id: c for c in causes} if channel else {}
-    told = [replace(both[c.id], gain=both[c.id].gain + c.gain) if c.id in both else c for c in channel]
-    return [c for c in causes if c.id not in {t.id for t in channel}], told
 
 
 def by_themselves(cause: CauseFound) -> bool:

@@ -17,7 +17,7 @@ from sim.model import Model
 from sim.pad import Pad
 
 from .channel import FEW, Faults, faults, not_of_the_motion, of_the_model, resting, standing_off, strays
-from .channel_causes import by_themselves, channel_causes, hum_cause, joined, merged
+from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS, beyond_limit
 from .held_out import SEEN, held_out_square, later_square
@@ -294,8 +294,7 @@ def _concluded(
     gains = [(a - b) / scale for a, b in zip(excess, excess[1:], strict=False)]
     causes = found(search, path, whole[1], gains)
     least = min(TOLD * scale, SPEAKS * floor**2)
-    told_too = [replace(c, gain=c.gain / scale) for c in channel if c.gain > least or by_themselves(c)]
-    causes = joined(*merged(causes, told_too))
+    causes = joined(causes, [replace(c, gain=c.gain / scale) for c in channel if c.gain > least or by_themselves(c)])
     left = excess[-1] / scale if causes and np.isfinite(scale) else 1.0 - sum(c.gain for c in causes)
     if causes:
         verdict = "explained" if explains(left, causes) else "unexplained"

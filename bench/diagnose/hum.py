@@ -141,19 +141,19 @@ def _dimmed(line: Line, t: Array, e: Array) -> Line:
     """The line as a dimmer makes it, which lets each half wave through from an angle on: the one that leaves least."""
 
     def one(fires: float, more: float = 1.0, later: float = 0.0) -> Line:
+        fires = float(np.clip(fires, FIRES[0], FIRES[-1]))
         sine, cosine = first_of_dimmed(fires)
         phase = line.phase_rad - float(np.arctan2(cosine, sine)) + later
         return replace(line, amplitude_N=line.amplitude_N * more, phase_rad=phase, fires_rad=fires)
 
     def left(x: Array) -> float:
-        fires = float(np.clip(x[0], FIRES[0], FIRES[-1]))
-        return float(np.sum((e - one(fires, float(x[1]), float(x[2])).force_N(t, t)) ** 2))
+        return float(np.sum((e - one(*x.tolist()).force_N(t, t)) ** 2))
 
     # what is folded onto the first harmonic has its share in amplitude and phase
     start = min((np.array([fires, 1.0, 0.0]) for fires in FIRES), key=left)
     simplex = start + np.vstack([np.zeros(3), np.diag([0.05, 0.1, 0.1])])
     best = minimize(left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": 200}).x
-    return one(float(np.clip(best[0], FIRES[0], FIRES[-1])), float(best[1]), float(best[2]))
+    return one(*best.tolist())
 
 
 def _with_harmonics(line: Line, t: Array, e: Array, least: float, highest: float, spacing: float) -> Line:

@@ -91,7 +91,7 @@ class Sieve:
             for pair, found in zip(wanted, pool.map(lambda p: starts(signatures, *p), wanted), strict=True):
                 by_id.setdefault(pair[0].id, []).extend(found)
             promising = self._promising(by_id, least) if only is None else list(by_id)
-            for id_, start in self._hidden(fit, wanted, promising):
+            for id_, start in self._hidden(signatures, wanted, promising):
                 by_id[id_].append(start)
                 promising += [] if id_ in promising else [id_]
             self.progress(f"{len(promising)} candidates")
@@ -182,14 +182,14 @@ class Sieve:
         return order[:WORTH]
 
     def _hidden(
-        self, fit: Fit, pairs: Sequence[tuple[Effect, Form]], promising: Sequence[str]
+        self, at: Signatures, pairs: Sequence[tuple[Effect, Form]], promising: Sequence[str]
     ) -> list[tuple[str, Start]]:
         """Causes whose place a mode of the pad has taken, among those whose signature shows nothing; and a mode whose
         place others have taken."""
         rates, believed = self.believed.pad.pad.relaxation.rates, self.believed.pad.x()
-        causes = [instead_of_a_mode(fit, rates, cause_of(*pair)) for pair in pairs if pair[0].id not in promising]
+        causes = [instead_of_a_mode(at.fit, rates, cause_of(*pair)) for pair in pairs if pair[0].id not in promising]
         out = [(cause.id, Start(cause, np.inf, believed)) for cause in causes if cause is not None]
-        more = [one_more_mode(self.short, fit, rates, cause_of(*pair)) for pair in pairs]
+        more = [one_more_mode(at, rates, cause_of(*pair)) for pair in pairs]
         return [*out, *((cause.id, Start(cause, np.inf, pad)) for cause, pad in (m for m in more if m is not None))]
 
     def _sieved(

@@ -17,10 +17,10 @@ from scipy.optimize import lsq_linear
 
 from sim.relaxation import Relaxation
 
-from .data import Data
+from .candidates import Signatures
 from .modes import NAMED, left_over
 from .numbers import Cause
-from .refit import Fit, force_at, jacobian
+from .refit import force_at
 
 Array = NDArray[np.float64]
 
@@ -31,9 +31,9 @@ LEAST = 1e-4  # of the force: a lesser mode is none
 MOST = 0.97  # of the force that relaxes
 
 
-def one_more_mode(data: Data, fit: Fit, believed_rates: Sequence[float], cause: Cause) -> tuple[Cause, Array] | None:
+def one_more_mode(at: Signatures, believed_rates: Sequence[float], cause: Cause) -> tuple[Cause, Array] | None:
     """The missing mode to start from, and the pad's vector beside it; None where the spectrum has no mode too many."""
-    structure, order = fit.structure, len(believed_rates)
+    data, fit, structure, order = at.data, at.fit, at.fit.structure, len(believed_rates)
     if cause.id != NAMED or cause.form.name != cause.effect.forms[0].name or order == 0:
         return None
     end = len(structure.pad.coordinates)
@@ -51,10 +51,10 @@ def one_more_mode(data: Data, fit: Fit, believed_rates: Sequence[float], cause: 
     law = fit.x[: end - 2 * order]
     elastic = force(Relaxation(), law)
     modes = [data.whitened(force(Relaxation((UNIT,), (nu,)), law) - elastic) / UNIT for nu in rates.tolist()]
-    curve = -jacobian(data, structure, fit.x)[:, : len(law)]  # of the force, by the numbers of the law
+    curve = -at.jacobian[:, : len(law)]  # of the force, by the numbers of the law
     A = np.hstack([curve, np.stack(modes, axis=1)])
     target = data.whitened(data.force_N - elastic)
-    pressed = force_at(data, structure, fit.x) > PRESSED * structure.pad.force_N  # where it lets go it is no sum
+    pressed = at.force > PRESSED * structure.pad.force_N  # where it lets go it is no sum
     if not (np.isfinite(A).all() and np.isfinite(target).all()) or int(pressed.sum()) < 2 * A.shape[1]:
         return None
     room = np.concatenate([structure.upper[: len(law)] - law, np.full(RATES, MOST)])
@@ -65,7 +65,7 @@ def one_more_mode(data: Data, fit: Fit, believed_rates: Sequence[float], cause: 
     if len(peaks) < order + 1 or total <= 0.0:
         return None
     shares = [share * min(1.0, MOST / total) for share, _ in peaks]
-    own = left_over([at for _, at in peaks], np.log(believed_rates))
+    own = left_over([log for _, log in peaks], np.log(believed_rates))
     others = sorted((k for k in range(len(peaks)) if k != own), key=lambda k: -peaks[k][1])
     relaxation = Relaxation(tuple(shares[k] for k in others), tuple(float(np.exp(peaks[k][1])) for k in others))
     begun = cause.with_start(share=shares[own], rate=float(np.exp(peaks[own][1])))

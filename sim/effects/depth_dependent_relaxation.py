@@ -21,16 +21,22 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
-from sim.jit import State, block
+from sim.jit import State, block, compiled
 
 _LEAST = 0.1
+
+
+@compiled("float64(float64)")
+def _kept(factor: float) -> float:
+    """A factor, continued below a tenth by an exponential that never reaches 0."""
+    return factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0))
 
 
 @block
 def linear(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on the rates; p = (slope,)."""
     factor = 1.0 + p[0] * max(depth, 0.0)
-    return factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0))
+    return _kept(factor)
 
 
 @block
@@ -43,7 +49,7 @@ def exponential(dt: float, depth: float, state: State, p: State) -> float:
 def hyperbolic(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on the rates; p = (slope,)."""
     factor = 1.0 - p[0] * max(depth, 0.0)
-    return 1.0 / (factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0)))
+    return 1.0 / _kept(factor)
 
 
 @block
@@ -58,14 +64,14 @@ def knee(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on the rates; p = (slope, knee)."""
     here = max(depth, 0.0)
     factor = 1.0 + p[0] * min(here, p[1])
-    return float(factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0)))
+    return _kept(factor)
 
 
 @block
 def beyond(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on the rates; p = (slope, begins, reach)."""
     factor = 1.0 + p[0] * max(depth - p[1] * p[2], 0.0) / (1.0 - p[1])
-    return float(factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0)))
+    return _kept(factor)
 
 
 _SLOPE = Parameter(
