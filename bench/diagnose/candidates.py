@@ -35,7 +35,7 @@ LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
 MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich
-LONGEST_REPORTED = 0.6  # of the depth, for errors of the position: longer ones are another elastic law
+LONGEST_REPORTED = 0.7  # of the depth, for errors of the position: longer ones are another elastic law
 
 
 @dataclass(frozen=True)

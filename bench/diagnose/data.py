@@ -105,6 +105,21 @@ class Data:
 
 
 @dataclass(frozen=True)
+class FeltErrors:
+    """What errors of the positions make of a model's force through more than the pad's stiffness, standard deviations
+    (n,), N: of each sample by itself, and the same for all of a stretch."""
+
+    own_N: Array
+    shared_N: Array
+    stretch: NDArray[np.intp]
+
+    @property
+    def total_N(self) -> Array:
+        """Of a sample all in all (n,)."""
+        return np.asarray(np.hypot(self.own_N, self.shared_N))
+
+
+@dataclass(frozen=True)
 class Prepared:
     """`full`: every sample; `short`: blocks; `owner` (full.size,): the block of each. `at`: force samples in `full`."""
 
@@ -128,6 +143,14 @@ class Prepared:
     zero_N: float
     depth_mm: float
     force_scale_N: float
+    position_time_s: Array
+    position_std_mm: Array
+    position_rest: NDArray[np.intp]
+    """(p,) each: stamps of the positions; what is left of their noise there; number of the rest, which is off as a
+    whole, 0: in motion."""
+    felt: FeltErrors
+    """In `full.sigma_N` too, as if each sample were off by itself: a fit that let go of what stretches share would let
+    go of the friction itself."""
 
     @property
     def raw(self) -> Data:
@@ -153,16 +176,40 @@ class Prepared:
         colour = self.colour
         return replace(self, full=replace(self.full, colour=colour), short=replace(self.short, colour=colour))
 
+    def doubting(self, felt: FeltErrors) -> Prepared:
+        """With other such errors than before."""
+        sigma = np.sqrt(np.maximum(self.full.sigma_N**2 - self.felt.total_N**2, 0.0) + felt.total_N**2)
+        full = replace(self.full, sigma_N=sigma)
+        return replace(self, full=full, short=_averaged(full, self.owner), felt=felt)
+
+    @property
+    def judged(self) -> Data:
+        """`full`, with what the motion's errors make the same for all of a stretch as just that."""
+        full, felt = self.full, self.felt
+        if not felt.shared_N.any():
+            return full
+        own = np.sqrt(np.maximum(full.sigma_N**2 - felt.shared_N**2, 0.0))
+        before = 0.0 if full.shared_N is None else full.shared_N
+        return replace(full, sigma_N=own, shared_N=np.hypot(before, felt.shared_N), stretch=felt.stretch)
+
     @property
     def floor_N(self) -> float:
         """RMS of an error with nothing left to explain."""
+        return self._rms(self.full.total_N)
+
+    @property
+    def felt_floor_N(self) -> float:
+        """Of it, RMS of what errors of the positions make through more than the pad."""
+        return self._rms(self.felt.total_N)
+
+    def _rms(self, values: Array) -> float:
         w = self.full.weight
-        return float(np.sqrt(np.sum(w * self.full.total_N**2) / max(w.sum(), 1.0)))
+        return float(np.sqrt(np.sum(w * values**2) / max(w.sum(), 1.0)))
 
     @property
     def floor_square_std(self) -> float:
         """Standard deviation of a mean square of the noise, N²: few stretches share few errors."""
-        full, n = self.full, max(float(self.full.weight.sum()), 1.0)
+        full, n = self.judged, max(float(self.full.weight.sum()), 1.0)
         together = 0.0
         if full.shared_N is not None and full.stretch is not None:
             together = float(np.sum(np.bincount(full.stretch, full.weight * full.shared_N**2) ** 2))
@@ -245,6 +292,10 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
         zero_N=m.zero_std_N,
         depth_mm=depth,
         force_scale_N=max(float(np.abs(m.force_N[counted]).max()), 1e-6),
+        position_time_s=m.position_time_s,
+        position_std_mm=np.interp(m.position_time_s, motion.time_s, motion.std_mm),
+        position_rest=motion.rest_at(m.position_time_s),
+        felt=FeltErrors(np.zeros(len(grid)), np.zeros(len(grid)), stretch),
     )
 
 

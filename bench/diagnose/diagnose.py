@@ -16,6 +16,7 @@ from bench.recording.types import Measurement
 from sim.model import Model
 from sim.pad import Pad
 
+from .candidates import CHANNEL
 from .channel import FEW, Faults, faults, not_of_the_motion, of_the_model, resting, standing_off, strays
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
@@ -68,6 +69,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     search = Search(prepared, structure, tell, ["saturation"] if flags.saturated.any() else [])
     tell("refitting what is believed")
     base = search.base(_pads(m, believed, structure, flags.good))
+    prepared = search.prepared
     if flags.outlier.any() or flags.unsure is not None:
         prepared, flags, search, path = _asked_again(m, prepared, flags, search, Path([base]))
         base = path.fits[0]
@@ -209,6 +211,8 @@ def believed_structure(model: Model, prepared: Prepared) -> Structure:
     pad = PadNumbers(model.pad.physics(), prepared.depth_mm, prepared.force_scale_N)
     causes = []
     for entry in model.effects:
+        if entry.id in CHANNEL:
+            continue
         active = entry.active()
         causes.append(cause_of(active.effect, active.form, active.values))
     return Structure(pad, tuple(causes), prepared.doubt_mm, prepared.zero_N)
@@ -265,7 +269,7 @@ def _asked_again(
     beside = moving & ~outlier
     if not beside.any() or float(np.mean(errors[beside] ** 2)) > near or not strays(m, errors, outlier & moving):
         flags = not_of_the_motion(m, flags)
-    anew = prepare(m, flags.good)
+    anew = prepare(m, flags.good).doubting(prepared.felt)
     prepared = anew.white() if prepared.memory == 1.0 else anew
     again = Search(prepared, search.believed, search.progress, search.known)
     path = replace(path, fits=[onto(f, prepared.short, 15, 1e-8) for f in path.fits])
@@ -278,15 +282,18 @@ def _concluded(
 ) -> Diagnosis:  # fmt: skip
     full, raw, at = prepared.full, prepared.raw, prepared.at
     before, after = (force_at(full, f.structure, f.x) for f in whole)
+    known = {entry.id for entry in believed.effects}
+    if "mains_hum" in known:
+        before = before + prepared.hum_N
     residual = raw.force_N - after
     swing = _swinging(prepared, residual)
     if swing is not None:
         floor, squares, excess = _apart(prepared, swing, floor, squares, excess)
-    tests = remains(full, residual, whole[1].free, swing)
+    tests = remains(prepared.judged, residual, whole[1].free, swing)
     told = [r for r in tests if r.passed]
     if len(fits) > 1 and not told:
         excess = seen(excess, floor)
-    channel = channel_causes(m, prepared, flags, before, whole[1])
+    channel = [c for c in channel_causes(m, prepared, flags, before, whole[1]) if c.id not in known]
     apart = sum(c.gain for c in channel)  # still in N²
     scale = excess[0] + apart
     if scale <= 0:
@@ -310,7 +317,7 @@ def _concluded(
         verdict=verdict,
         causes=causes,
         left=float(left),
-        noise_floor=floor,
+        noise_floor=min(float(np.sqrt(prepared.floor_N**2 - prepared.felt_floor_N**2)), floor),
         rmse_before=float(np.sqrt(np.mean((raw.force_N - before)[at][inside] ** 2))),
         rmse_after=float(np.sqrt(np.mean(residual[at][good] ** 2))),
         held_out_before=float(np.sqrt(squares[0] + apart)),

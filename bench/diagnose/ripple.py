@@ -13,15 +13,29 @@ from numpy.typing import NDArray
 
 from sim.effects.base import Form
 
+from .numbers import Cause
+
 Array = NDArray[np.float64]
 
 PERIODS = 36
+TURNS = 24  # parts of a period
 RATIO = 2.5  # of the second harmonic to the first at the most, to start with
 
 
 def ripples(form: Form) -> bool:
     """Whether a form repeats with the position."""
     return {"period", "phase"} <= {p.name for p in form.parameters}
+
+
+def turned(cause: Cause) -> list[Cause]:
+    """The same ripple, begun at every part of its period."""
+    out = []
+    for turn in np.linspace(0.0, 2.0 * np.pi, TURNS, endpoint=False):
+        phases = {"phase": cause.start["phase"] + turn}
+        if "second_phase" in cause.start:
+            phases["second_phase"] = cause.start["second_phase"] + 2.0 * turn
+        out.append(cause.with_start(**{name: float(np.mod(value, 2.0 * np.pi)) for name, value in phases.items()}))
+    return out
 
 
 def starts(

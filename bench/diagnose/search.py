@@ -10,13 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import CHANNEL, Signatures, alike, forms, starts
+from .candidates import CHANNEL, Signatures, alike, combinations, forms, narrowed, starts
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, too_small, unexplained
+from .felt_errors import felt_errors
 from .numbers import cause_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
+from .ripple import ripples, turned
 from .shapes import departed, families
-from .sieve import ALL, CLOSE, LATER, MORE, WORKERS, Sieve
+from .sieve import ALL, CLOSE, LATER, MORE, WORKERS, Sieve, repeating_first
 
 Array = NDArray[np.float64]
 
@@ -29,6 +31,7 @@ HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left b
 BETTER = 10.0  # Δχ², times what the best leaves over what noise does: for less no cause is exchanged
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MOST_CAUSES = 3
+MOST_SHAPES = 12  # of a believed cause, that are tried
 RIVALS = 2  # beside the best, that are asked for their best shapes
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
 
@@ -54,10 +57,32 @@ class Search(Sieve):
 
     def base(self, pads: Sequence[Array]) -> Fit:
         """The believed structure with its numbers refitted, from each of some vectors of the pad."""
-        fits = [refit(self.short, self.believed, self.believed.x(x), 12, 1e-5) for x in pads]
+        fits = [refit(self.short, self.believed, x, 12, 1e-5) for x in self._starts(pads)]
         fits.sort(key=lambda f: f.chi2)
         ended = [refit(self.short, f.structure, f.x, 60, 1e-9) for f in fits[:2] if f.chi2 < 3 * fits[0].chi2]
-        return min(ended, key=lambda f: f.chi2)
+        path = Path([min(ended, key=lambda f: f.chi2)])
+        self._felt(path)
+        return path.fits[0]
+
+    def _starts(self, pads: Sequence[Array]) -> list[Array]:
+        """Vectors from which the belief is refitted: as believed, and with the shapes that a form leaves open begun
+        anew. What repeats with the position starts where in its period it fits best: that depends on where the surface
+        is, which is another one with each pad."""
+        own = self.believed.causes
+        told = [[c.start for c in own]]
+        for index, cause in enumerate(own):  # as finely as these data tell what the contract does not ask for
+            form = narrowed(cause.form, self.reach)
+            free = replace(form, parameters=tuple(p for p in form.parameters if not p.required and not p.fixed))
+            for values in [*combinations(free), {p.name: p.if_left_out for p in free.parameters}][:MOST_SHAPES]:
+                told.append([{**c.start, **(values if k == index else {})} for k, c in enumerate(own)])
+        at = [k for k, cause in enumerate(own) if ripples(cause.form)]
+        if at:
+            bare = replace(self.believed, causes=tuple(c for k, c in enumerate(own) if k not in at))
+            fits = [refit(self.short, bare, bare.x(pad), 12, 1e-5) for pad in pads]
+            signatures = Signatures(self.short, min(fits, key=lambda f: f.chi2))
+            best = {k: max(turned(own[k]), key=signatures.whole).start for k in at}
+            told.insert(0, [best.get(k, c.start) for k, c in enumerate(own)])
+        return [self.believed.x(pad, values) for pad in pads for values in told]
 
     def path(self, base: Fit) -> Path:
         """Causes one after the other while each pays; then those that others have made needless go."""
@@ -66,6 +91,7 @@ class Search(Sieve):
         begun = time.process_time()
         while len(path.fits) <= MOST_CAUSES and time.process_time() - begun < LONGEST_S:
             self._whitened(path)
+            self._felt(path)
             turn = self._turn(path)
             if turn is None:
                 break
@@ -168,7 +194,7 @@ class Search(Sieve):
             return ranked
         with ThreadPoolExecutor(WORKERS) as pool:
             shaped = list(pool.map(self._shaped, [best, *near]))
-        lead = min(shaped, key=lambda t: t.score)
+        lead = repeating_first(now, sorted(shaped, key=lambda t: t.score))[0]
         if lead.score > shaped[0].score - LATER * self.prepared.memory:
             lead = shaped[0]
         clean = lead.fit.chi2 - self.expected < CLEAN * max(now.chi2 - self.expected, 0.0)
@@ -195,6 +221,17 @@ class Search(Sieve):
         if mean_square(prepared.full, last.structure, last.x) < QUIET * prepared.floor_N**2:
             self.prepared = prepared.white()
             path.fits = [refit(self.short, f.structure, f.x, 20, 1e-8) for f in path.fits]
+
+    def _felt(self, path: Path) -> None:
+        """What the last fit's causes make of errors of the positions is noise: nothing else tells of it."""
+        last = path.fits[-1]
+        if not last.structure.causes:
+            return
+        felt = felt_errors(self.prepared, last)
+        if np.array_equal(felt.total_N, self.prepared.felt.total_N):
+            return
+        self.prepared = self.prepared.doubting(felt)
+        path.fits = [refit(self.short, f.structure, f.x, 20, 1e-8) for f in path.fits]
 
     def _reshaped(self, before: float, after: float, reshaped: float) -> bool:
         """Whether another shape of a cause found does what a further cause did. All are χ²."""

@@ -20,6 +20,7 @@ from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .path import Trial
 from .refit import Fit, extended, force_at, jacobian, refit
+from .ripple import ripples
 from .spectrum import one_more_mode
 
 Array = NDArray[np.float64]
@@ -36,6 +37,7 @@ WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 LIMIT = 24.0  # Δχ² by which one with a number at its bound must be better: it is another cause's limit
+AS_A_WAVE = 0.99  # of the gain of a law drawn through points: so much a wave takes that is what was drawn
 ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexplained: so little more is none
 
 
@@ -122,7 +124,8 @@ class Sieve:
         found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[third:]]]
         found_all += [sieved[i][0] for i in order[second:]]
         found_all.sort(key=lambda t: t.score)
-        return self._plainer(fit, sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score))
+        ranked = sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score)
+        return repeating_first(fit, self._plainer(fit, ranked))
 
     def _plainer(self, fit: Fit, ranked: list[Trial]) -> list[Trial]:
         """First the one of fewest numbers, and of as many the first form of its family, where what it leaves more is
@@ -318,6 +321,28 @@ class Sieve:
 
     def _carried(self, trial: Trial, steps: int) -> Trial:
         return self._trial(refit(self.short, trial.fit.structure, trial.fit.x, steps, 1e-8))
+
+
+def repeating_first(fit: Fit, ranked: list[Trial]) -> list[Trial]:
+    """First an error of the position that repeats, where a law that is drawn through points stood in front of it and
+    takes hardly more of what `fit` leaves.
+
+    On a pad that stays put the two are the same function of the position, and a curve through points can be any; that
+    it comes out as a wave of more than one period tells of the encoder, and not of a pad.
+    """
+    if not ranked or not _drawn(ranked[0]):
+        return ranked
+    gained = fit.chi2 - ranked[0].fit.chi2
+    wave = next((t for t in ranked[1:] if _repeats(t) and fit.chi2 - t.fit.chi2 > AS_A_WAVE * gained), None)
+    return ranked if wave is None else [wave, *(t for t in ranked if t is not wave)]
+
+
+def _drawn(trial: Trial) -> bool:
+    return trial.id == "elastic_law" and trial.cause.form.name.endswith("spline")
+
+
+def _repeats(trial: Trial) -> bool:
+    return ripples(trial.cause.form) and "report" in trial.cause.form.blocks
 
 
 def _worth(fit: Fit, ranked: Sequence[Sequence[Trial]], most: int) -> int:

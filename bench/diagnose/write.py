@@ -9,6 +9,7 @@ import numpy as np
 from sim.elastic import NoPad
 from sim.model import Model
 
+from .candidates import CHANNEL
 from .data import Prepared
 from .refit import Fit
 
@@ -46,6 +47,8 @@ def model_of(believed: Model, fit: Fit, prepared: Prepared, limit_N: float | Non
                 position += 1
             row[p.name] = quantity
         effects.append(row)
+    ids = {row["id"] for row in effects}
+    effects += [row for row in believed.to_dict().get("effects", ()) if row["id"] in CHANNEL and row["id"] not in ids]
     if limit_N is not None and all(row["id"] != "saturation" for row in effects):
         effects.append({"id": "saturation", "limit": {"value": abs(limit_N), "unit": "N"}})
     if effects:

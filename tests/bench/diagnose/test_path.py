@@ -45,6 +45,9 @@ class Told(Search):
         found = self.ranks.get(ids, {})
         return [SimpleNamespace(id=i, fit=fit(chi2, *ids, i), score=chi2) for i, chi2 in found.items()]
 
+    def _felt(self, path: Any) -> None:
+        """There are no data."""
+
     def settled(self, now: Any, joined: Any) -> Any:
         return now
 

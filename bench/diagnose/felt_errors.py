@@ -1,0 +1,76 @@
+"""What errors of the positions make of a model's force beyond the pad's stiffness.
+
+Friction that turns round within a micrometre, and a mass that feels the second derivative, make much of what is left
+of the encoder's noise, and of what smoothing has bent: no model can say more of the force than the positions do. It is
+found by moving the positions within their doubt, and running the model again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from bench.identify.motion import holds
+
+from .data import Data, FeltErrors, Prepared
+from .refit import Fit, force_at
+
+Array = NDArray[np.float64]
+
+RUNS, SEED = 12, 0
+BENT = 2.0  # times what is left of the noise: smoothing takes as much away as it leaves doubt
+TOGETHER = 7  # entries whose scatter is taken for one
+SEEN = 0.3  # of the noise: less changes nothing
+
+
+def felt_errors(prepared: Prepared, fit: Fit) -> FeltErrors:
+    """What errors of the positions make through the causes of a fit."""
+    data = replace(prepared.full, tared=None, stretch=_rests(prepared.full))
+    bare = replace(fit.structure, causes=())
+    pad = bare.x(fit.x[: len(bare.pad.coordinates)], [], fit.of_run)
+    rng = np.random.default_rng(SEED)
+    models = ((fit.structure, fit.x), (bare, pad))
+    still = [force_at(data, *model) for model in models]
+    runs: list[list[Array]] = [[], []]
+    for _ in range(RUNS):
+        error = BENT * prepared.position_std_mm * _drawn(prepared.position_rest, rng)
+        moved = replace(data, position_mm=data.position_mm + np.interp(data.time_s, prepared.position_time_s, error))
+        for run, model, before in zip(runs, models, still, strict=True):
+            run.append(np.nan_to_num(force_at(moved, *model) - before, nan=0.0, posinf=0.0, neginf=0.0))
+    # about the mean of the runs: that they shake friction loose is no error of the positions
+    scatter = [np.array(run) - np.mean(run, axis=0) for run in runs]
+    common = [np.array([_common(data, change) for change in run]) for run in scatter]
+    own_N2, shared_N2 = (
+        np.maximum(np.sum(with_causes**2, axis=0) - np.sum(without**2, axis=0), 0.0) / (RUNS - 1)
+        for with_causes, without in ([s - c for s, c in zip(scatter, common, strict=True)], common)
+    )
+    own_N2 = np.maximum(uniform_filter1d(own_N2, TOGETHER), 0.0)
+    least = (SEEN * prepared.noise.force_N) ** 2
+    own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
+    return FeltErrors(own_N, shared_N, data.stretch)
+
+
+def _drawn(rest: NDArray[np.intp], rng: np.random.Generator) -> Array:
+    """Errors (p,) of scatter 1: one for each rest, and of each position in motion by itself."""
+    of_rests = rng.standard_normal(int(rest.max()) + 1)[rest]
+    return np.where(rest > 0, of_rests, rng.standard_normal(len(rest)))
+
+
+def _rests(data: Data) -> NDArray[np.intp]:
+    """The stretches (n,), a whole rest one of them: what holds a slider holds it until the next move."""
+    stretch = np.zeros(data.size, dtype=np.intp) if data.stretch is None else data.stretch.copy()
+    for s in holds(data.time_s, data.position_mm):
+        stretch[s] = stretch[s.start]
+    return np.asarray(np.unique(stretch, return_inverse=True)[1], dtype=np.intp)
+
+
+def _common(data: Data, change_N: Array) -> Array:
+    """Mean of a change (n,) over the forces of each stretch."""
+    if data.stretch is None:
+        return np.zeros(data.size)
+    counts = np.bincount(data.stretch, data.weight)
+    means = np.bincount(data.stretch, data.weight * change_N) / np.maximum(counts, 1e-300)
+    return np.asarray(means[data.stretch])
