@@ -182,7 +182,7 @@ class Prepared:
         full = replace(self.full, sigma_N=sigma)
         return replace(self, full=full, short=_averaged(full, self.owner), felt=felt)
 
-    @property
+    @cached_property
     def judged(self) -> Data:
         """`full`, with what the motion's errors make the same for all of a stretch as just that."""
         full, felt = self.full, self.felt
@@ -191,6 +191,11 @@ class Prepared:
         own = np.sqrt(np.maximum(full.sigma_N**2 - felt.shared_N**2, 0.0))
         before = 0.0 if full.shared_N is None else full.shared_N
         return replace(full, sigma_N=own, shared_N=np.hypot(before, felt.shared_N), stretch=felt.stretch)
+
+    @cached_property
+    def judged_short(self) -> Data:
+        """The stand-in for `judged`."""
+        return self.short if self.judged is self.full else _averaged(self.judged, self.owner)
 
     @property
     def floor_N(self) -> float:

@@ -21,14 +21,15 @@ from .refit import Fit, force_at
 Array = NDArray[np.float64]
 
 RUNS, SEED = 12, 0
-BENT = 2.0  # times what is left of the noise: smoothing takes as much away as it leaves doubt
+BENT = 3.0  # times what is left of the noise: smoothing takes as much away as it leaves doubt
 TOGETHER = 7  # entries whose scatter is taken for one
 SEEN = 0.3  # of the noise: less changes nothing
 
 
 def felt_errors(prepared: Prepared, fit: Fit) -> FeltErrors:
     """What errors of the positions make through the causes of a fit."""
-    data = replace(prepared.full, tared=None, stretch=_rests(prepared.full))
+    stretch, resting = _rests(prepared.full)
+    data = replace(prepared.full, tared=None, stretch=stretch)
     bare = replace(fit.structure, causes=())
     pad = bare.x(fit.x[: len(bare.pad.coordinates)], [], fit.of_run)
     rng = np.random.default_rng(SEED)
@@ -48,9 +49,18 @@ def felt_errors(prepared: Prepared, fit: Fit) -> FeltErrors:
         for with_causes, without in ([s - c for s, c in zip(scatter, common, strict=True)], common)
     )
     own_N2 = np.maximum(uniform_filter1d(own_N2, TOGETHER), 0.0)
+    if resting.any():  # where a slider is held is chance, and few runs miss much of it in a rest
+        counts = prepared.full.weight * resting
+        pooled = float(np.sum(counts * shared_N2) / max(counts.sum(), 1.0))
+        shared_N2 = np.where(resting, np.maximum(shared_N2, pooled), shared_N2)
+    # no more than is there: what a fit meets well it shall go on meeting
+    left = prepared.full.force_N - force_at(prepared.full, fit.structure, fit.x)
+    off = _common(data, left)
+    counted = np.maximum(uniform_filter1d(data.weight, TOGETHER), 1e-12)
+    own_N2 = np.minimum(own_N2, uniform_filter1d(data.weight * (left - off) ** 2, TOGETHER) / counted)
     least = (SEEN * prepared.noise.force_N) ** 2
     own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
-    return FeltErrors(own_N, shared_N, data.stretch)
+    return FeltErrors(own_N, shared_N, stretch)
 
 
 def _drawn(rest: NDArray[np.intp], rng: np.random.Generator) -> Array:
@@ -59,12 +69,13 @@ def _drawn(rest: NDArray[np.intp], rng: np.random.Generator) -> Array:
     return np.where(rest > 0, of_rests, rng.standard_normal(len(rest)))
 
 
-def _rests(data: Data) -> NDArray[np.intp]:
-    """The stretches (n,), a whole rest one of them: what holds a slider holds it until the next move."""
+def _rests(data: Data) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """The stretches (n,), a whole rest one of them: what holds a slider does so until the next move; and what rests."""
     stretch = np.zeros(data.size, dtype=np.intp) if data.stretch is None else data.stretch.copy()
+    resting = np.zeros(data.size, dtype=bool)
     for s in holds(data.time_s, data.position_mm):
-        stretch[s] = stretch[s.start]
-    return np.asarray(np.unique(stretch, return_inverse=True)[1], dtype=np.intp)
+        stretch[s], resting[s] = stretch[s.start], True
+    return np.asarray(np.unique(stretch, return_inverse=True)[1], dtype=np.intp), resting
 
 
 def _common(data: Data, change_N: Array) -> Array:

@@ -306,7 +306,11 @@ class Search(Sieve):
         return again if again.chi2 < now.chi2 else now
 
     def judge(self, before: Fit, after: Fit, base: Fit) -> Evidence:
-        """Whether the step from one fit to the next is more than chance, and more than a crumb."""
+        """Whether the step from one fit to the next is more than chance, and more than a crumb. What a slider's errors
+        make the same for all of a rest counts once there."""
+        data = self.prepared.judged_short
+        if data is not self.short:
+            before, after, base = (refit(data, fit.structure, fit.x, 8, 1e-6) for fit in (before, after, base))
         return evidence_of(before, after, base, self.prepared.memory, self.samples, self.expected)
 
     def exchanged(self, path: Path) -> Fit:
