@@ -16,51 +16,77 @@ from scipy.ndimage import uniform_filter1d
 from bench.identify.motion import holds
 
 from .data import Data, FeltErrors, Prepared
+from .numbers import Structure
 from .refit import Fit, force_at
 
 Array = NDArray[np.float64]
 
-RUNS, SEED = 12, 0
+RUNS = 12
 BENT = 3.0  # times what is left of the noise: smoothing takes as much away as it leaves doubt
 TOGETHER = 7  # entries whose scatter is taken for one
 SEEN = 0.3  # of the noise: less changes nothing
 
 
-def felt_errors(prepared: Prepared, fit: Fit) -> FeltErrors:
+def felt_errors(prepared: Prepared, fit: Fit, rng: np.random.Generator) -> FeltErrors:
     """What errors of the positions make through the causes of a fit."""
     stretch, resting = _rests(prepared.full)
     data = replace(prepared.full, tared=None, stretch=stretch)
     bare = replace(fit.structure, causes=())
     pad = bare.x(fit.x[: len(bare.pad.coordinates)], [], fit.of_run)
-    rng = np.random.default_rng(SEED)
-    models = ((fit.structure, fit.x), (bare, pad))
-    still = [force_at(data, *model) for model in models]
-    runs: list[list[Array]] = [[], []]
+    full, through_pad = _Scatter(data, fit.structure, fit.x), _Scatter(data, bare, pad)
     for _ in range(RUNS):
         error = BENT * prepared.position_std_mm * _drawn(prepared.position_rest, rng)
-        moved = replace(data, position_mm=data.position_mm + np.interp(data.time_s, prepared.position_time_s, error))
-        for run, model, before in zip(runs, models, still, strict=True):
-            run.append(np.nan_to_num(force_at(moved, *model) - before, nan=0.0, posinf=0.0, neginf=0.0))
-    # about the mean of the runs: that they shake friction loose is no error of the positions
-    scatter = [np.array(run) - np.mean(run, axis=0) for run in runs]
-    common = [np.array([_common(data, change) for change in run]) for run in scatter]
-    own_N2, shared_N2 = (
-        np.maximum(np.sum(with_causes**2, axis=0) - np.sum(without**2, axis=0), 0.0) / (RUNS - 1)
-        for with_causes, without in ([s - c for s, c in zip(scatter, common, strict=True)], common)
-    )
-    own_N2 = np.maximum(uniform_filter1d(own_N2, TOGETHER), 0.0)
+        position = data.position_mm + np.interp(data.time_s, prepared.position_time_s, error)
+        for scatter in (full, through_pad):
+            scatter.add(position)
+    own_N2 = np.maximum(uniform_filter1d(np.maximum(full.own.variance - through_pad.own.variance, 0.0), TOGETHER), 0.0)
+    shared_N2 = np.maximum(full.shared.variance - through_pad.shared.variance, 0.0)
     if resting.any():  # where a slider is held is chance, and few runs miss much of it in a rest
-        counts = prepared.full.weight * resting
+        counts = data.weight * resting
         pooled = float(np.sum(counts * shared_N2) / max(counts.sum(), 1.0))
         shared_N2 = np.where(resting, np.maximum(shared_N2, pooled), shared_N2)
     # no more than is there: what a fit meets well it shall go on meeting
     left = prepared.full.force_N - force_at(prepared.full, fit.structure, fit.x)
-    off = _common(data, left)
+    square = data.weight * (left - _common(data, left)) ** 2
     counted = np.maximum(uniform_filter1d(data.weight, TOGETHER), 1e-12)
-    own_N2 = np.minimum(own_N2, uniform_filter1d(data.weight * (left - off) ** 2, TOGETHER) / counted)
+    own_N2 = np.minimum(own_N2, np.maximum(uniform_filter1d(square, TOGETHER), 0.0) / counted)
     least = (SEEN * prepared.noise.force_N) ** 2
     own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
     return FeltErrors(own_N, shared_N, stretch)
+
+
+class _Moments:
+    """Running sums of arrays (n,) and of their squares."""
+
+    def __init__(self, size: int) -> None:
+        self.count, self.sum, self.square = 0, np.zeros(size), np.zeros(size)
+
+    def add(self, values: Array) -> None:
+        self.count += 1
+        self.sum += values
+        self.square += values**2
+
+    @property
+    def variance(self) -> Array:
+        """About the mean: that the runs shake friction loose is no error of the positions."""
+        return np.maximum(self.square - self.sum**2 / self.count, 0.0) / (self.count - 1)
+
+
+class _Scatter:
+    """Of a model's force, from run to run: `shared` by all of a stretch, and each sample's `own`."""
+
+    def __init__(self, data: Data, structure: Structure, x: Array) -> None:
+        self.data, self.structure, self.x = data, structure, x
+        self.before = force_at(data, structure, x)
+        self.own, self.shared = _Moments(data.size), _Moments(data.size)
+
+    def add(self, position_mm: Array) -> None:
+        """One more run, over other positions (n,)."""
+        change = force_at(replace(self.data, position_mm=position_mm), self.structure, self.x) - self.before
+        change = np.where(np.isfinite(change), change, 0.0)
+        common = _common(self.data, change)
+        self.shared.add(common)
+        self.own.add(change - common)
 
 
 def _drawn(rest: NDArray[np.intp], rng: np.random.Generator) -> Array:

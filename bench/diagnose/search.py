@@ -31,6 +31,7 @@ HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left b
 BETTER = 10.0  # Δχ², times what the best leaves over what noise does: for less no cause is exchanged
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MOST_CAUSES = 3
+SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
 RIVALS = 2  # beside the best, that are asked for their best shapes
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
@@ -227,7 +228,7 @@ class Search(Sieve):
         last = path.fits[-1]
         if not last.structure.causes:
             return
-        felt = felt_errors(self.prepared, last)
+        felt = felt_errors(self.prepared, last, np.random.default_rng(SEED))
         if np.array_equal(felt.total_N, self.prepared.felt.total_N):
             return
         self.prepared = self.prepared.doubting(felt)

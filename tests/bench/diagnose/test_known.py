@@ -73,7 +73,7 @@ def felt(effects: list[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray, np.ndar
     p = prepare(m, np.ones(len(m.force_N), dtype=bool))
     structure = believed_structure(Model.from_dict({**c.believed, "effects": effects}), p)
     fit = refit(p.short, structure, structure.x(structure.pad.x()), 0, 1.0)
-    return p.full.position_mm[p.at], felt_errors(p, fit).total_N[p.at], p.full.sigma_N[p.at]
+    return p.full.position_mm[p.at], felt_errors(p, fit, np.random.default_rng(0)).total_N[p.at], p.full.sigma_N[p.at]
 
 
 def test_errors_of_the_position_are_felt_by_what_feels_more_than_the_pad():
