@@ -23,7 +23,6 @@ REACHES = np.array([2, 3, 4, 6, 8, 11, 15, 21, 29, 40, 56, 80, 112, 160], dtype=
 """Half-widths of the windows, in samples."""
 SHORTEST, EDGE = 30, 4  # samples of a hold that can show it to be at rest; samples at its ends that may still move
 LIKELY, CHANCE = 4.0, 5.0  # standard deviations: levels nearer are one, samples farther off are no noise
-CREEPING = 8  # neighbours by whose mean it is seen whether a rest has begun
 BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
 TOGETHER = 20  # samples that share the error of a window, about
 WIDTH = 2.2  # standard deviations on either side of a value
@@ -175,8 +174,7 @@ def _rested(
     hop = resolution(position_mm) if coarse else 0.0
     noise_mm = max(noise_mm, 0.5 * hop)
     quiet_mm = max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)), 0.6 * hop)
-    for number, (first, last) in enumerate(_rests(position_mm, clean_mm, noise_mm, quiet_mm), 1):
-        a, b = _arrived(position_mm, first, last, noise_mm)
+    for number, (a, b) in enumerate(_rests(position_mm, clean_mm, noise_mm, quiet_mm), 1):
         inside = position_mm[a + EDGE : b + 1 - EDGE]
         n = len(inside)
         if n < SHORTEST:
@@ -192,18 +190,6 @@ def _rested(
             again = reached.setdefault(float(np.median(inside)), number) if coarse else number
             hold[a : b + 1] = again
     return clean, std, hold
-
-
-def _arrived(position_mm: Array, first: int, last: int, noise_mm: float) -> tuple[int, int]:
-    """A rest (first, last) without what still creeps to its level, or from it: less than the noise in a sample, and
-    yet more than a slider moves that friction holds."""
-    middle = position_mm[first + EDGE : last + 1 - EDGE]
-    if len(middle) < 4 * SHORTEST:
-        return first, last
-    level = float(np.median(middle))
-    off = (position_mm[first : last + 1] - level) / (noise_mm * np.sqrt(CREEPING))
-    inside = np.abs(np.convolve(off, np.ones(CREEPING), mode="valid")) <= LIKELY
-    return first + int(np.argmax(inside)), last - int(np.argmax(inside[::-1]))
 
 
 def _staying(off: Array) -> int:

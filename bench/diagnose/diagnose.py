@@ -25,7 +25,7 @@ from .held_out import SEEN, held_out_square, later_square
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
-from .refit import Fit, extended, force_at, mean_square, onto, refit
+from .refit import Fit, extended, force_at, mean_square, onto, placed, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
 from .search import Search
@@ -180,14 +180,18 @@ def _floor(prepared: Prepared, final: Fit) -> float:
 def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fit, Fit]:
     """First and last fit carried to the end on all the data, with the hum that the last one then has to make."""
     raw = prepared.raw
+    alike = not prepared.felt.total_N.any()
     before = onto(fits[0], prepared.full, 6, 1e-8)
+    before = before if alike else placed(prepared.full, before)
     last = replace(fits[-1], x=missing_told(fits[-1], believed))
     if prepared.hum is None or not prepared.hum.of_the_mains:
-        return before, _spread(prepared, prepared.full, onto(last, prepared.full, 6, 1e-8))
+        after = _spread(prepared, prepared.full, onto(last, prepared.full, 6, 1e-8))
+        return before, after if alike else placed(prepared.full, after)
     cause = hum_cause(prepared.hum)
     structure = last.structure.with_cause(cause)
     own = structure.x(last.x[: len(structure.pad.coordinates)], None)[structure.of_cause(len(structure.causes) - 1)]
-    return before, _spread(prepared, raw, refit(raw, structure, extended(last, own), 8, 1e-8))
+    after = _spread(prepared, raw, refit(raw, structure, extended(last, own), 8, 1e-8))
+    return before, after if alike else placed(raw, after)
 
 
 def _faded(fits: list[Fit], whole: Fit) -> int | None:
@@ -283,7 +287,7 @@ def _concluded(
     full, raw, at = prepared.full, prepared.raw, prepared.at
     before, after = (force_at(full, f.structure, f.x) for f in whole)
     known = {entry.id for entry in believed.effects}
-    if "mains_hum" in known:
+    if "mains_hum" in known and prepared.hum is not None and prepared.hum.of_the_mains:
         before = before + prepared.hum_N
     residual = raw.force_N - after
     swing = _swinging(prepared, residual)

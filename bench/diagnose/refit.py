@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import Bounds, minimize
 
 from bench.identify._kernel import accumulate
 from bench.identify.solver import minimise
@@ -88,6 +89,25 @@ def mean_square(data: Data, structure: Structure, x: Array) -> float:
     """Mean squared error over the samples that count, N²."""
     e = data.force_N - force_at(data, structure, x)
     return float(np.sum(data.weight * e * e) / max(data.weight.sum(), 1.0))
+
+
+def placed(data: Data, fit: Fit) -> Fit:
+    """The fit with the run's own numbers, surface and zero, where all samples count alike: there whoever compares the
+    model with the run finds them again (`bench.like`), and errors are told of all samples alike."""
+    tail = fit.structure.tail
+    if tail == 0:
+        return fit
+    model = fit.x[: len(fit.x) - tail]
+    square = max(mean_square(data, fit.structure, fit.x), 1e-300)
+    counted = float(data.weight.sum())
+
+    def cost(of_run: Array) -> float:
+        x = np.concatenate([model, of_run])
+        return counted * mean_square(data, fit.structure, x) / square + float(np.sum(of_run**2))
+
+    bounds = Bounds(fit.structure.lower[-tail:], fit.structure.upper[-tail:])
+    found = minimize(cost, fit.of_run, method="Nelder-Mead", bounds=bounds, options={"maxfev": 120, "fatol": 1e-3})
+    return replace(fit, x=np.concatenate([model, found.x])) if found.fun < cost(fit.of_run) else fit
 
 
 def jacobian(

@@ -45,6 +45,13 @@ def test_a_short_step_out_of_a_rest_is_motion() -> None:
     assert np.mean(np.interp(t[out], told.time_s, told.position_mm) - staircase(t)[out]) > 5 * NOISE_MM
 
 
+def test_rests_are_numbered_and_moves_are_not() -> None:
+    t = np.arange(0.0, 66.0, STEP_S)
+    told = felt(t, staircase(t) + NOISE_MM * np.random.default_rng(1).standard_normal(t.size))
+    number = told.rest_at(np.array([3.0, 4.0, 6.015, 12.0, 24.0]))
+    assert number[0] == number[1] > 0 and number[2] == 0 and len({*number.tolist()}) == 4
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_slow_move_is_one_whatever_its_noise(seed: int) -> None:
     """A mass would feel each piece of it stop and start."""
