@@ -32,7 +32,7 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
     error = (prepared.raw.force_N - before_N)[at]
     n = max(len(at), 1)
     out = []
-    if prepared.hum is not None and prepared.hum.of_the_mains:
+    if prepared.mains is not None:
         hum = prepared.hum_N[at][counted]
         id_, form, numbers = described(final, len(final.structure.causes) - 1)
         out.append(_named(id_, form, numbers, float(np.sum(hum**2)) / n))

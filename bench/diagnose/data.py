@@ -160,6 +160,11 @@ class Prepared:
         return replace(self.full, force_N=self.full.force_N + self.hum_N)
 
     @property
+    def mains(self) -> Line | None:
+        """`hum`, where it is the mains'."""
+        return self.hum if self.hum is not None and self.hum.of_the_mains else None
+
+    @property
     def colour(self) -> Colour:
         """Of the force's noise."""
         return self.noise.colour

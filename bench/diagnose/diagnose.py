@@ -179,19 +179,19 @@ def _floor(prepared: Prepared, final: Fit) -> float:
 
 def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fit, Fit]:
     """First and last fit carried to the end on all the data, with the hum that the last one then has to make."""
-    raw = prepared.raw
-    alike = not prepared.felt.total_N.any()
-    before = onto(fits[0], prepared.full, 6, 1e-8)
-    before = before if alike else placed(prepared.full, before)
-    last = replace(fits[-1], x=missing_told(fits[-1], believed))
-    if prepared.hum is None or not prepared.hum.of_the_mains:
-        after = _spread(prepared, prepared.full, onto(last, prepared.full, 6, 1e-8))
-        return before, after if alike else placed(prepared.full, after)
-    cause = hum_cause(prepared.hum)
-    structure = last.structure.with_cause(cause)
-    own = structure.x(last.x[: len(structure.pad.coordinates)], None)[structure.of_cause(len(structure.causes) - 1)]
-    after = _spread(prepared, raw, refit(raw, structure, extended(last, own), 8, 1e-8))
-    return before, after if alike else placed(raw, after)
+    full, data, mains = prepared.full, prepared.full, prepared.mains
+    before, last = onto(fits[0], full, 6, 1e-8), replace(fits[-1], x=missing_told(fits[-1], believed))
+    if mains is None:
+        after = onto(last, full, 6, 1e-8)
+    else:
+        data, structure = prepared.raw, last.structure.with_cause(hum_cause(mains))
+        hum = structure.of_cause(len(structure.causes) - 1)
+        own = structure.x(last.x[: len(structure.pad.coordinates)], None)[hum]
+        after = refit(data, structure, extended(last, own), 8, 1e-8)
+    after = _spread(prepared, data, after)
+    if prepared.felt.total_N.any():
+        before, after = placed(full, before), placed(data, after)
+    return before, after
 
 
 def _faded(fits: list[Fit], whole: Fit) -> int | None:
@@ -215,7 +215,7 @@ def believed_structure(model: Model, prepared: Prepared) -> Structure:
     pad = PadNumbers(model.pad.physics(), prepared.depth_mm, prepared.force_scale_N)
     causes = []
     for entry in model.effects:
-        if entry.id in CHANNEL:
+        if entry.id in CHANNEL:  # the detectors find it and take it out
             continue
         active = entry.active()
         causes.append(cause_of(active.effect, active.form, active.values))
@@ -287,7 +287,7 @@ def _concluded(
     full, raw, at = prepared.full, prepared.raw, prepared.at
     before, after = (force_at(full, f.structure, f.x) for f in whole)
     known = {entry.id for entry in believed.effects}
-    if "mains_hum" in known and prepared.hum is not None and prepared.hum.of_the_mains:
+    if "mains_hum" in known and prepared.mains is not None:
         before = before + prepared.hum_N
     residual = raw.force_N - after
     swing = _swinging(prepared, residual)

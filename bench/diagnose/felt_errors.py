@@ -30,10 +30,10 @@ SEEN = 0.3  # of the noise: less changes nothing
 def felt_errors(prepared: Prepared, fit: Fit, rng: np.random.Generator) -> FeltErrors:
     """What errors of the positions make through the causes of a fit."""
     stretch, resting = _rests(prepared.full)
-    data = replace(prepared.full, tared=None, stretch=stretch)
+    data = replace(prepared.full, tared=None)
     bare = replace(fit.structure, causes=())
     pad = bare.x(fit.x[: len(bare.pad.coordinates)], [], fit.of_run)
-    full, through_pad = _Scatter(data, fit.structure, fit.x), _Scatter(data, bare, pad)
+    full, through_pad = _Scatter(data, stretch, fit.structure, fit.x), _Scatter(data, stretch, bare, pad)
     for _ in range(RUNS):
         error = BENT * prepared.position_std_mm * _drawn(prepared.position_rest, rng)
         position = data.position_mm + np.interp(data.time_s, prepared.position_time_s, error)
@@ -47,7 +47,7 @@ def felt_errors(prepared: Prepared, fit: Fit, rng: np.random.Generator) -> FeltE
         shared_N2 = np.where(resting, np.maximum(shared_N2, pooled), shared_N2)
     # no more than is there: what a fit meets well it shall go on meeting
     left = prepared.full.force_N - force_at(prepared.full, fit.structure, fit.x)
-    square = data.weight * (left - _common(data, left)) ** 2
+    square = data.weight * (left - _common(stretch, data.weight, left)) ** 2
     counted = np.maximum(uniform_filter1d(data.weight, TOGETHER), 1e-12)
     own_N2 = np.minimum(own_N2, np.maximum(uniform_filter1d(square, TOGETHER), 0.0) / counted)
     least = (SEEN * prepared.noise.force_N) ** 2
@@ -75,8 +75,8 @@ class _Moments:
 class _Scatter:
     """Of a model's force, from run to run: `shared` by all of a stretch, and each sample's `own`."""
 
-    def __init__(self, data: Data, structure: Structure, x: Array) -> None:
-        self.data, self.structure, self.x = data, structure, x
+    def __init__(self, data: Data, stretch: NDArray[np.intp], structure: Structure, x: Array) -> None:
+        self.data, self.stretch, self.structure, self.x = data, stretch, structure, x
         self.before = force_at(data, structure, x)
         self.own, self.shared = _Moments(data.size), _Moments(data.size)
 
@@ -84,7 +84,7 @@ class _Scatter:
         """One more run, over other positions (n,)."""
         change = force_at(replace(self.data, position_mm=position_mm), self.structure, self.x) - self.before
         change = np.where(np.isfinite(change), change, 0.0)
-        common = _common(self.data, change)
+        common = _common(self.stretch, self.data.weight, change)
         self.shared.add(common)
         self.own.add(change - common)
 
@@ -104,10 +104,8 @@ def _rests(data: Data) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     return np.asarray(np.unique(stretch, return_inverse=True)[1], dtype=np.intp), resting
 
 
-def _common(data: Data, change_N: Array) -> Array:
+def _common(stretch: NDArray[np.intp], weight: Array, change_N: Array) -> Array:
     """Mean of a change (n,) over the forces of each stretch."""
-    if data.stretch is None:
-        return np.zeros(data.size)
-    counts = np.bincount(data.stretch, data.weight)
-    means = np.bincount(data.stretch, data.weight * change_N) / np.maximum(counts, 1e-300)
-    return np.asarray(means[data.stretch])
+    counts = np.bincount(stretch, weight)
+    means = np.bincount(stretch, weight * change_N) / np.maximum(counts, 1e-300)
+    return np.asarray(means[stretch])

@@ -49,7 +49,7 @@ def model_of(believed: Model, fit: Fit, prepared: Prepared, limit_N: float | Non
         effects.append(row)
     ids = {row["id"] for row in effects}
     effects += [row for row in believed.to_dict().get("effects", ()) if row["id"] in CHANNEL and row["id"] not in ids]
-    if limit_N is not None and all(row["id"] != "saturation" for row in effects):
+    if limit_N is not None and "saturation" not in ids:
         effects.append({"id": "saturation", "limit": {"value": abs(limit_N), "unit": "N"}})
     if effects:
         content["effects"] = effects
