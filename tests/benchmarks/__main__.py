@@ -15,8 +15,8 @@ from pathlib import Path
 from tests.benchmarks.report import Section, Table, goal_table, machine
 
 NAMES = (
-    "dry_run", "plant", "wire", "stop_latency", "fit", "estimator", "undetermined", "touch_off", "recording", "day",
-    "export",
+    "dry_run", "plant", "wire", "stop_latency", "fit", "estimator", "undetermined", "diagnosis", "touch_off",
+    "recording", "day", "export",
 )  # fmt: skip
 """In the order of the page; each is a module of this package with `run() -> Section`."""
 

@@ -94,12 +94,13 @@ def _compatible(first: str, second: str) -> bool:
     return laws and (a.contact is None or b.contact is None or a.contact == b.contact)
 
 
-def _known(half: str) -> list[str]:
+def catalogued(half: str) -> list[str]:
+    """Ids of the catalogue that have shapes of a half."""
     return [id for id in CATALOGUE if id in EFFECTS and EFFECTS[id].of(half)]
 
 
 def _pair(rng: np.random.Generator, half: str) -> tuple[str, str]:
-    known = _known(half)
+    known = catalogued(half)
     while True:
         first, second = sorted(str(id) for id in rng.choice(known, 2, replace=False))
         if _compatible(first, second):
@@ -134,7 +135,7 @@ def _hidden(seed: int, counts: dict[str, int], half: str) -> list[tuple[float, I
     """Cases of one half with something hidden, each with how far on in its group it stands."""
     # The first half was there before there were two: its streams go by the group alone.
     label = "" if half == "first" else f"{half}/"
-    known, placed = _known(half), []
+    known, placed = catalogued(half), []
     beyond = sorted(id for id in set(EFFECTS) - set(CATALOGUE) if EFFECTS[id].of(half))
 
     def stream(group: str, what: str, number: int) -> np.random.Generator:
