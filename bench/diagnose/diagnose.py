@@ -373,7 +373,7 @@ def _apart(
 def _ranking(path: Path) -> list[Alternative]:
     if not path.rivals:
         return []
-    base = path.fits[0].chi2
+    base = path.measures[0].before
     best = path.rivals[0][0].fit.chi2
     gained = max(base - best, 1e-12)
     return [

@@ -30,9 +30,13 @@ class Trial:
 
 @dataclass(frozen=True)
 class Measure:
-    """By which a χ² is judged: what noise alone leaves, the samples that say something of their own, and those that
-    say the same as one and count all the same."""
+    """By which the χ² of a stage are judged: what the fit before it left, what noise alone leaves, the samples that say
+    something of their own, and those that say the same as one and count all the same.
 
+    Kept with the stage, for the path's fits go on: to whitened data, and to other samples counted.
+    """
+
+    before: float
     expected: float
     effective: float
     memory: float

@@ -153,7 +153,7 @@ class Search(Sieve):
     def _note(self, path: Path, turn: _Turn) -> None:
         path.rivals.append([*turn.ranked, *turn.small])
         path.tried.append(turn.tried)
-        path.measures.append(Measure(self.expected, self.effective, self.prepared.memory))
+        path.measures.append(Measure(path.fits[-1].chi2, self.expected, self.effective, self.prepared.memory))
         path.evidence.append(turn.found)
 
     def _added(self, path: Path, turn: _Turn) -> bool:

@@ -96,19 +96,19 @@ def explains(left: float, causes: Sequence[CauseFound]) -> bool:
     return left <= EXPLAINED * sure * (0.5 if len(causes) >= MANY else 1.0)
 
 
-def stage_of(path: Path, id_: str) -> tuple[Trial, list[Trial], float, Measure] | None:
-    """Where a cause came in: (itself joined there, what stood beside it, χ² before, by what χ² was judged)."""
-    stages = list(zip(path.fits, path.rivals, path.measures, strict=False))
+def stage_of(path: Path, id_: str) -> tuple[Trial, list[Trial], Measure] | None:
+    """Where a cause came in: (itself joined there, what stood beside it, by what χ² was judged)."""
+    stages = list(zip(path.rivals, path.measures, strict=True))
     for first in (True, False):
-        for before, ranked, measure in stages:
+        for ranked, measure in stages:
             own = [t for t in ranked if t.id == id_]
             if own and (not first or ranked[0].id == id_):
-                return own[0], [t for t in ranked if t.id != id_], before.chi2, measure
+                return own[0], [t for t in ranked if t.id != id_], measure
     return None
 
 
 def alternatives(
-    measure: Measure, fit: Fit, without_chi2: float, rivals: Sequence[Trial], named: Sequence[str] = ()
+    measure: Measure, fit: Fit, rivals: Sequence[Trial], named: Sequence[str] = ()
 ) -> tuple[list[Alternative], float, float]:
     """(those that the data cannot exclude, and the strongest rival; confidence in the name, and in its kind).
 
@@ -117,7 +117,7 @@ def alternatives(
     best = fit.chi2
     # what the family's shape leaves counts as noise when names are compared: no shape is exact
     scale = max(best / max(measure.expected, 1.0), 1.0) * np.sqrt(measure.memory)
-    gained = max(without_chi2 - best, 1e-12)
+    gained = max(measure.before - best, 1e-12)
     out: list[Alternative] = []
     odds, of_others = 0.0, 0.0
     late = fit.structure.causes[-1].id in LATE
@@ -125,7 +125,7 @@ def alternatives(
         delta = t.fit.chi2 - best
         extra = t.fit.free - fit.free
         effective = delta / scale + extra * np.log(measure.effective)
-        share = float(np.clip((without_chi2 - t.fit.chi2) / gained, 0.0, 1.0))
+        share = float(np.clip((measure.before - t.fit.chi2) / gained, 0.0, 1.0))
         excluded = bool(effective > RIVAL and share < 0.995)
         ratio = float(delta) / (unexplained(best, measure.expected) + 1.0)
         if t.id in named:
@@ -143,8 +143,8 @@ def sureness(path: Path, id_: str, named: Sequence[str]) -> tuple[list[Alternati
     stage = stage_of(path, id_)
     if stage is None:
         return [], 0.5, 0.5
-    trial, rivals, before, measure = stage
-    return alternatives(measure, trial.fit, before, rivals, named)
+    trial, rivals, measure = stage
+    return alternatives(measure, trial.fit, rivals, named)
 
 
 def described(fit: Fit, index: int) -> tuple[str, str, dict[str, Number]]:

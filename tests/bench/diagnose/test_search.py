@@ -14,6 +14,7 @@ from bench.diagnose.numbers import PadNumbers, Structure, cause_of
 from bench.diagnose.path import Trial
 from bench.diagnose.refit import Fit, chi2, force_at, refit
 from bench.diagnose.search import Search
+from bench.diagnose.verdict import sureness
 from sim import effects
 from sim.elastic import Exponential
 from sim.model import Model
@@ -127,3 +128,18 @@ def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
     path = search.path(base)
     assert path.rivals[0][0].id == "elastic_law"
     assert {cause.id for cause in path.fits[-1].structure.causes} == set(sizes)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_rivals_stand_against_what_the_fit_before_left_in_the_same_units(seed):
+    """Once the noise's colour is in the cost, the path's fits have another χ² than those that were compared."""
+    c = draw_case(seed, ("viscous_damping",), 2.5, "linear", protocol="rich", rate_hz=300.0, jitter="none",
+                  noise_kind="coloured", noise_N=0.01)  # fmt: skip
+    search, base = begun(c)
+    assert search.prepared.memory > 1.5
+    path = search.path(base)
+    assert search.prepared.memory == 1.0 and path.measures[0].memory > 1.5
+    best, second = (base.chi2 - t.fit.chi2 for t in path.rivals[0][:2])
+    shares = [a.gain_share for a in sureness(path, path.rivals[0][0].id, [])[0] if a.id == path.rivals[0][1].id]
+    assert best > second > 0.0
+    assert shares == pytest.approx([second / best], rel=0.05)
