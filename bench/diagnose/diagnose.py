@@ -295,9 +295,9 @@ def _concluded(
         floor, squares, excess = _apart(prepared, swing, floor, squares, excess)
     tests = remains(prepared.judged, residual, whole[1].free, swing)
     told = [r for r in tests if r.passed]
-    if len(fits) > 1 and not told:
-        excess = seen(excess, floor)
     channel = [c for c in channel_causes(m, prepared, flags, before, whole[1]) if c.id not in known]
+    if (len(fits) > 1 or channel) and not told:
+        excess = seen(excess, floor)
     apart = sum(c.gain for c in channel)  # still in N²
     scale = excess[0] + apart
     if scale <= 0:

@@ -25,6 +25,7 @@ MOST_LEFT, SPEAKS = 0.6, 0.01  # of what is left, and of the noise power: a caus
 RIVAL = 25.0  # Δχ², rescaled by what is left: less excludes no rival
 FEWEST = 3  # samples at fault that are called a fault
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
+TRACE = 2e-4  # the same, of one that takes most of what a far larger one leaves: no shape is so exact
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Evidence:
         if self.known == 0 or self.share >= SHARE:
             return True
         # a small one beside a giant; but a third that is small has two inexact shapes to be the rest of
-        return self.known == 1 and self.of_left >= MOST_LEFT and self.crumb >= SPEAKS
+        return self.known == 1 and self.share >= TRACE and self.of_left >= MOST_LEFT and self.crumb >= SPEAKS
 
 
 def threshold(freedom: int) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose import verdict
-from bench.diagnose.evidence import Evidence
+from bench.diagnose.evidence import TRACE, Evidence
 from bench.diagnose.search import Search
 
 module = importlib.import_module("bench.diagnose.search")
@@ -98,6 +98,13 @@ def test_a_third_cause_must_take_its_share_of_all():
     assert named(Told(ranks, fit(1050.0, *second))) == list(second)
     ranks = {(): {"force_drift": 2e6}, first: {"backlash": 4000.0}, second: {"adhesion": 1000.0}}
     assert named(Told(ranks, fit(4000.0, *second))) == list(second)
+
+
+def test_beside_a_giant_a_trace_may_be_what_its_shape_misses():
+    ranks = {(): {"force_drift": 1300.0}, ("force_drift",): {"backlash": 1000.0}}
+    of_the_giant = 300.0 / (3e6 - NOISE)
+    assert of_the_giant < TRACE
+    assert named(Told(ranks, fit(1000.0, "force_drift", "backlash"))) == ["force_drift"]
 
 
 def test_where_next_to_nothing_is_left_no_two_are_tried():
