@@ -33,6 +33,7 @@ SHORTEST = 0.12  # of the longest period
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
+BENDS_AT = (0.08, 0.14, 0.2, 0.28, 0.38, 0.5, 0.7)  # of the depth reached
 MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich
 LONGEST_REPORTED = 0.7  # of the depth, for errors of the position: longer ones are another elastic law
@@ -96,6 +97,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     elif p.name == "bends_at":  # a rate that is another one but for a moment at the begin is a step
         lower, upper = 0.15 * reach.span_s, min(upper, 0.95 * reach.span_s)
         starts, default = tuple(share * reach.span_s for share in MOVED_AT[1:]), 0.5 * reach.span_s
+    elif p.bend:
+        starts = tuple(share * reach.depth_mm for share in BENDS_AT)
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm
     elif p.name == "at_force":

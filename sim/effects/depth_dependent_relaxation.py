@@ -116,7 +116,14 @@ EFFECT = Effect(
             parameters=(
                 _SLOPE,
                 Parameter(
-                    "knee", "mm", 0.1, 1e3, 1.5, "depth from which the rates stay as they are", starts=(0.7, 2.0)
+                    "knee",
+                    "mm",
+                    0.1,
+                    1e3,
+                    1.5,
+                    "depth from which the rates stay as they are",
+                    starts=(0.7, 2.0),
+                    bend=True,
                 ),
             ),
             sought=False,

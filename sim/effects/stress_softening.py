@@ -36,6 +36,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
@@ -173,7 +174,7 @@ EFFECT = Effect(
         Form(
             name="linear",
             what="softer in proportion to the distance below the deepest point, up to the share",
-            parameters=(_SHARE, _DEPTH, _ALREADY),
+            parameters=(_SHARE, replace(_DEPTH, bend=True), _ALREADY),
             blocks={"elastic": linear},
             state=(0.0,),
         ),
