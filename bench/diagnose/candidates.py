@@ -101,6 +101,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         starts = tuple(share * reach.depth_mm for share in BENDS_AT)
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm
+    elif p.name == "at_swing":
+        default = 0.03 * reach.force_N
     elif p.name == "at_force":
         default = 0.6 * reach.force_N
     elif p.name == "limit" and p.unit == "N":

@@ -16,8 +16,11 @@ The damping ratio ends at 0.5: beyond, a second-order low-pass has next to no pe
   the motion of the rest.
 - `loaded`: ω² goes with the force that is borne, ω² (1 + growth (F/at_force − 1)), and not below a fifth: cells and
   joints are stiffer or softer under load. The stiffness stands still within a step.
+- `damper`: a `share` of the damping at a swing of `at_swing` is that of a damper whose force goes with a power of the
+  speed: 2 for oil that is throttled, less than 1 for joints that rub. The ratio stated is that of equal loss in each swing
+  (Thomson, section 2.9), and the parts of a step follow each other.
 
-Exact for a force that is linear between samples, at any spacing, but for the last.
+Exact for a force that is linear between samples, at any spacing, but for the last two.
 
 Reference: W. T. Thomson, Theory of Vibration with Applications, 4th ed., Prentice Hall, 1993; E. O. Doebelin,
 Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3; J. P. Den Hartog, Mechanical
@@ -33,9 +36,26 @@ from collections.abc import Mapping
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.linear import first_order
 from sim.effects.linear import low_pass as exact
-from sim.jit import State, block
+from sim.jit import State, block, compiled
 
 _Y, _SPEED, _LAST, _STARTED, _AFTER, _AFTER_SPEED = range(6)
+
+_TURN, _MOST_PARTS = 0.3, 200
+"""Angle of a swing, rad, that a part of a step takes at the most; parts of a step."""
+
+
+@compiled("float64(float64, float64, float64, float64)")
+def _braked(dt: float, speed: float, strength: float, exponent: float) -> float:
+    """Speed after dt of v' = −strength · |v|^exponent, exactly; at rest it stays."""
+    size = abs(speed)
+    if size < 1e-200 or strength == 0.0:
+        return speed
+    if abs(exponent - 1.0) < 1e-6:
+        left = size * math.exp(-strength * dt)
+    else:
+        power = size ** (1.0 - exponent) - (1.0 - exponent) * strength * dt
+        left = power ** (1.0 / (1.0 - exponent)) if power > 0.0 else 0.0
+    return math.copysign(left, speed)
 
 
 @block
@@ -169,6 +189,44 @@ def loaded(dt: float, u: float, state: State, p: State) -> float:
     return y
 
 
+@block
+def damper(dt: float, u: float, state: State, p: State) -> float:
+    """Force after a mode with a damper of its own; p = (frequency, damping_ratio of the rest, strength, exponent).
+
+    The damper takes speed as v' = −strength · |v|^exponent, for half of each part of the step before and after what
+    the rest of the mode does (G. Strang, SIAM J. Numer. Anal. 5, 1968, 506–517).
+    """
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+        state[_LAST] = u
+    omega = 2.0 * math.pi * p[0]
+    parts = min(1 + int(omega * max(dt, 0.0) / _TURN), _MOST_PARTS)
+    part = max(dt, 0.0) / parts
+    y = state[_Y]
+    speed = state[_SPEED]
+    before = state[_LAST]
+    for k in range(parts):
+        after = before + (u - before) / (parts - k)
+        speed = _braked(0.5 * part, speed, p[2], p[3])
+        y, speed = exact(part, y, speed, before, after, omega, p[1])
+        speed = _braked(0.5 * part, speed, p[2], p[3])
+        before = after
+    state[_Y] = y
+    state[_SPEED] = speed
+    state[_LAST] = u
+    return y
+
+
+def _damped(values: Mapping[str, float]) -> tuple[float, ...]:
+    """Damping shared out between a viscous damper and one of another power, of equal loss in a swing."""
+    omega = 2.0 * math.pi * values["frequency"]
+    n, zeta, share = values["exponent"], values["damping_ratio"], values["share"]
+    loss = math.sqrt(math.pi) * math.gamma(0.5 * n + 1.5) / (2.0 * math.gamma(0.5 * n + 1.0))  # π over ∮ |cos|^(n+1)
+    fastest = omega * values["at_swing"]
+    return (values["frequency"], (1.0 - share) * zeta, 2.0 * share * zeta * omega * loss * fastest ** (1.0 - n), n)
+
+
 _FREQUENCY = Parameter(
     "frequency",
     "Hz",
@@ -282,6 +340,21 @@ EFFECT = Effect(
             sought=False,
             blocks={"sensor": loaded},
             state=(0.0,) * 4,
+        ),
+        Form(
+            name="damper",
+            what="the mode has a damper that goes with a power of the speed",
+            parameters=(
+                _FREQUENCY,
+                _DAMPING,
+                Parameter("share", "1", 0.0, 1.0, 0.7, "share of the damping that is this damper's", starts=(0.7,)),
+                Parameter("exponent", "1", 0.5, 2.0, 2.0, "power of the speed", starts=(0.5, 2.0)),
+                Parameter("at_swing", "N", 1e-6, 1e5, 0.1, "swing with the damping stated", fixed=True),
+            ),
+            sought=False,
+            blocks={"sensor": damper},
+            state=(0.0,) * 4,
+            pack=_damped,
         ),
     ),
 )

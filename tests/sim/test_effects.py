@@ -49,7 +49,7 @@ CONTRACT = {
 """The table of the file formats: id, and the parameters that a file must give."""
 
 WITHOUT_AMPLITUDE = {
-    "resonance": {"low_pass", "transmitted", "amplifier", "mounted", "pair", "antiresonance", "loaded"},
+    "resonance": {"low_pass", "transmitted", "amplifier", "mounted", "pair", "antiresonance", "loaded", "damper"},
     "saturation": None,
     "separation": None,
     "elastic_law": None,

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 from scipy.signal import cheb1ap
 
 from sim.effects import Active, effect
@@ -210,6 +211,26 @@ class TestResonance:
             faster = math.sqrt(1 + 0.36 * (load / 4.0 - 1))
             plain = active("resonance", frequency=20.0 * faster, damping_ratio=0.05 / faster)
             assert_allclose(rings, sense(plain, t, np.where(t > 0.1, 1e-3, 0.0)), atol=1e-6)
+
+    @pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0])
+    def test_a_damper_that_goes_with_a_power_of_the_speed(self, exponent: float) -> None:
+        """Against the equation of motion, and its loss in a swing against that of a viscous damper."""
+        frequency, zeta, share, swing = 20.0, 0.1, 0.6, 0.3
+        w = 2 * math.pi * frequency
+        angles = np.linspace(0, 2 * math.pi, 20001)
+        loss = np.trapezoid(np.abs(np.cos(angles)) ** (exponent + 1), angles)
+        strength = 2 * zeta * share * w * math.pi / loss * (w * swing) ** (1 - exponent)
+        t = np.arange(800) * 1e-3
+        force = np.interp(t, [0.05, 0.06, 0.4, 0.42], [0.0, 1.0, 1.0, 0.4])
+
+        def moves(now: float, y: Array) -> list[float]:
+            drag = 2 * zeta * (1 - share) * w * y[1] + strength * abs(y[1]) ** exponent * np.sign(y[1])
+            return [y[1], w * w * (np.interp(now, t, force) - y[0]) - drag]
+
+        expected = solve_ivp(moves, (0.0, t[-1]), [0.0, 0.0], t_eval=t, max_step=2e-4, rtol=1e-8, atol=1e-10).y[0]
+        numbers = {"frequency": frequency, "damping_ratio": zeta, "share": share, "at_swing": swing}
+        out = sense(active("resonance", "damper", exponent=exponent, **numbers), t, force)
+        assert_allclose(out, expected, atol=1e-3)
 
     def test_other_shapes_are_exact_at_any_spacing(self) -> None:
         """What comes out of ramps between uneven samples does not change when more samples lie on them."""
