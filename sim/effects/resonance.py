@@ -17,8 +17,8 @@ The damping ratio ends at 0.5: beyond, a second-order low-pass has next to no pe
 - `loaded`: ω² goes with the force that is borne, ω² (1 + growth (F/at_force − 1)), and not below a fifth: cells and
   joints are stiffer or softer under load. The stiffness stands still within a step.
 - `damper`: a `share` of the damping at a swing of `at_swing` is that of a damper whose force goes with a power of the
-  speed: 2 for oil that is throttled, less than 1 for joints that rub. The ratio stated is that of equal loss in each swing
-  (Thomson, section 2.9), and the parts of a step follow each other.
+  speed: 2 for oil that is throttled, less than 1 for joints that rub. The ratio stated is that of equal loss in each
+  swing (Thomson, section 2.9), and the parts of a step follow each other.
 
 Exact for a force that is linear between samples, at any spacing, but for the last two.
 
