@@ -52,3 +52,18 @@ class Path:
     """Ids, best first, with those that could not be believed where they stood."""
     measures: list[Measure] = field(default_factory=list)
     evidence: list[Evidence] = field(default_factory=list)
+    compared: dict[str, tuple[Trial, list[Trial], Measure]] = field(default_factory=dict)
+    """By id, a cause beside its rivals where the path has ended: of those that came in amid causes that have gone."""
+
+    def stage_of(self, id_: str) -> tuple[Trial, list[Trial], Measure] | None:
+        """Where a cause came in, or was compared anew: (itself joined there, what stood beside it, by what χ² was
+        judged)."""
+        if id_ in self.compared:
+            return self.compared[id_]
+        stages = list(zip(self.rivals, self.measures, strict=True))
+        for first in (True, False):
+            for ranked, measure in stages:
+                own = [t for t in ranked if t.id == id_]
+                if own and (not first or ranked[0].id == id_):
+                    return own[0], [t for t in ranked if t.id != id_], measure
+        return None

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from .candidates import CHANNEL, Signatures, alike, combinations, forms, narrowed, starts
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, too_small, unexplained
 from .felt_errors import felt_errors
-from .numbers import cause_of
+from .numbers import Cause, cause_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import departed, families
-from .sieve import ALL, CLOSE, LATER, MORE, WORKERS, Sieve, repeating_first
+from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, repeating_first
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,8 @@ MOST_CAUSES = 3
 SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
 RIVALS = 2  # beside the best, that are asked for their best shapes
+SHAPES = 6  # starts of other forms of the causes found that are carried on
+COMPARED = 5  # rivals of a cause that is compared anew
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
 
 
@@ -105,6 +107,7 @@ class Search(Sieve):
             self._note(path, turn)
             if turn.of_a_shape or not self._added(path, turn):
                 break
+        self._compare(path)
         return path
 
     def _turn(self, path: Path) -> _Turn | None:
@@ -155,6 +158,22 @@ class Search(Sieve):
         path.tried.append(turn.tried)
         path.measures.append(Measure(path.fits[-1].chi2, self.expected, self.effective, self.prepared.memory))
         path.evidence.append(turn.found)
+
+    def _compare(self, path: Path) -> None:
+        """Causes that came in amid others which have gone since, beside what stood near them there, where the path has
+        ended: the others' errors tell nothing of how sure their names are."""
+        final = path.fits[-1]
+        named = [c.id for c in final.structure.causes]
+        for index in range(len(path.fits[0].structure.causes), len(named)):
+            stage = path.stage_of(named[index])
+            if stage is None or {c.id for c in stage[0].fit.structure.causes} <= set(named):
+                continue
+            structure, x = reduced(final, index)
+            without = refit(self.short, structure, x, 10, 1e-5)
+            near = [i for i in dict.fromkeys(t.id for t in (*stage[1], *path.rivals[0])) if i not in named][:COMPARED]
+            own = self._trial(last(final, named[index]))
+            measure = Measure(without.chi2, self.expected, self.effective, self.prepared.memory)
+            path.compared[own.id] = (own, self.ranked(without, only=near), measure)
 
     def _added(self, path: Path, turn: _Turn) -> bool:
         """Whether the turn's first cause pays, or would with earlier ones exchanged: then it is at the path's end."""
@@ -274,21 +293,24 @@ class Search(Sieve):
 
     def recurved(self, now: Fit) -> Fit:
         """The fit with one of its causes in another form, also of those that only refine others; if that is better."""
-        tried: list[Trial] = []
+        begun: list[tuple[Fit, Cause]] = []
         for index, cause in enumerate(now.structure.causes):
             if index < len(self.believed.causes) or cause.id in CHANNEL:
                 continue
             structure, x = reduced(now, index)
-            without = refit(self.short, structure, x, 10, 1e-5)
+            here, without = replace(now, structure=structure, x=x), refit(self.short, structure, x, 10, 1e-5)
             signatures = Signatures(self.short, without)
             for effect, form in forms(structure, structure.in_air, self.reach, also_unsought=True):
                 if effect.id != cause.id or form.name == cause.form.name:
                     continue
-                here = replace(now, structure=structure, x=x)
-                begun = [(here, alike(now, index, cause_of(effect, form)))]
+                begun.append((here, alike(now, index, cause_of(effect, form))))
                 begun += [(without, s.cause) for s in starts(signatures, effect, form)]
-                trials = [self._joined(*start, MORE, None) for start in begun]
-                tried += [t for t in trials if t is not None]
+        with ThreadPoolExecutor(WORKERS) as pool:
+            first = [
+                t for t in pool.map(lambda start: self._joined(start[0], start[1], FEW, None), begun) if t is not None
+            ]
+            first.sort(key=lambda t: t.score)
+            tried = list(pool.map(lambda t: self._carried(t, MORE), first[:SHAPES]))
         near = [t for t in tried if not departed(t.fit, len(t.fit.structure.causes) - 1)]
         of_a_form = {(t.id, t.cause.form.name): t for t in sorted(near, key=lambda t: -t.score)}
         fits = [self._carried(t, ALL).fit for t in sorted(of_a_form.values(), key=lambda t: t.score)[:2]]

@@ -96,17 +96,6 @@ def explains(left: float, causes: Sequence[CauseFound]) -> bool:
     return left <= EXPLAINED * sure * (0.5 if len(causes) >= MANY else 1.0)
 
 
-def stage_of(path: Path, id_: str) -> tuple[Trial, list[Trial], Measure] | None:
-    """Where a cause came in: (itself joined there, what stood beside it, by what χ² was judged)."""
-    stages = list(zip(path.rivals, path.measures, strict=True))
-    for first in (True, False):
-        for ranked, measure in stages:
-            own = [t for t in ranked if t.id == id_]
-            if own and (not first or ranked[0].id == id_):
-                return own[0], [t for t in ranked if t.id != id_], measure
-    return None
-
-
 def alternatives(
     measure: Measure, fit: Fit, rivals: Sequence[Trial], named: Sequence[str] = ()
 ) -> tuple[list[Alternative], float, float]:
@@ -140,7 +129,7 @@ def alternatives(
 
 def sureness(path: Path, id_: str, named: Sequence[str]) -> tuple[list[Alternative], float, float]:
     """`alternatives` of a cause that a search has found; `named`: all that were."""
-    stage = stage_of(path, id_)
+    stage = path.stage_of(id_)
     if stage is None:
         return [], 0.5, 0.5
     trial, rivals, measure = stage

@@ -48,6 +48,9 @@ class Told(Search):
     def _felt(self, path: Any) -> None:
         """There are no data."""
 
+    def _compare(self, path: Any) -> None:
+        """The same."""
+
     def settled(self, now: Any, joined: Any) -> Any:
         return now
 

@@ -128,6 +128,11 @@ def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
     path = search.path(base)
     assert path.rivals[0][0].id == "elastic_law"
     assert {cause.id for cause in path.fits[-1].structure.causes} == set(sizes)
+    for id in sizes:  # and it is beside these that a name is sure or not, and not beside the one that has gone
+        stage = path.stage_of(id)
+        assert stage is not None
+        assert {cause.id for cause in stage[0].fit.structure.causes} <= set(sizes)
+        assert stage[0].fit.chi2 < stage[2].before and id not in {rival.id for rival in stage[1]}
 
 
 @pytest.mark.parametrize("seed", [1, 2])
