@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 from bench.diagnose.result import Remainder
 from bench.report.diagnosis import diagnosis_page, write_diagnosis
-from bench.report.diagnosis_views import best_view
+from bench.report.diagnosis_plots import view
+from bench.report.diagnosis_views import Series, View, best_view
 from tests.bench.diagnose.small import made_up
 from tests.bench.report.html_check import check
 
@@ -58,8 +60,8 @@ def shown(residual: np.ndarray, **changes: object) -> str:
     d = made_up()
     noise = 1e-3 * np.random.default_rng(2).standard_normal(residual.size)
     d = replace(d, force_N=d.before_N + residual + noise, causes=[], **changes)
-    view = best_view(d)
-    return view.name if view is not None else ""
+    best = best_view(d)
+    return best.name if best is not None else ""
 
 
 def test_each_kind_of_residual_is_shown_against_what_makes_it():
@@ -72,6 +74,13 @@ def test_each_kind_of_residual_is_shown_against_what_makes_it():
     assert shown(0.05 * np.sin(2 * np.pi * x / 0.08)) == "position"
     assert shown(0.05 * np.sin(2 * np.pi * 21.0 * t)) == "frequency"
     assert shown(0.02 * cycle * (x > 0.1)) == "cycle"
+
+
+def test_ticks_of_a_logarithmic_axis_are_numbers():
+    series = Series("", np.geomspace(0.7, 70.0, 9), np.linspace(0.0, 1.0, 9), np.zeros(9))
+    drawn = view(View("speed", "speed, mm/s", 0.5, [series], logarithmic=True))
+    assert "$" not in drawn
+    assert {"1", "10", "50"} <= set(re.findall(r">\s*([0-9.]+)\s*<", drawn))
 
 
 def test_noise_alone_has_no_view():
