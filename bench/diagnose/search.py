@@ -168,8 +168,7 @@ class Search(Sieve):
             stage = path.stage_of(named[index])
             if stage is None or {c.id for c in stage[0].fit.structure.causes} <= set(named):
                 continue
-            structure, x = reduced(final, index)
-            without = refit(self.short, structure, x, 10, 1e-5)
+            without = self._without(final, index)
             near = [i for i in dict.fromkeys(t.id for t in (*stage[1], *path.rivals[0])) if i not in named][:COMPARED]
             own = self._trial(last(final, named[index]))
             measure = Measure(without.chi2, self.expected, self.effective, self.prepared.memory)
@@ -298,7 +297,7 @@ class Search(Sieve):
             if index < len(self.believed.causes) or cause.id in CHANNEL:
                 continue
             structure, x = reduced(now, index)
-            here, without = replace(now, structure=structure, x=x), refit(self.short, structure, x, 10, 1e-5)
+            here, without = replace(now, structure=structure, x=x), self._without(now, index)
             signatures = Signatures(self.short, without)
             for effect, form in forms(structure, structure.in_air, self.reach, also_unsought=True):
                 if effect.id != cause.id or form.name == cause.form.name:
@@ -316,6 +315,11 @@ class Search(Sieve):
         fits = [self._carried(t, ALL).fit for t in sorted(of_a_form.values(), key=lambda t: t.score)[:2]]
         others = [fit for fit in fits if not departed(fit, len(fit.structure.causes) - 1)]
         return min([now, *others], key=lambda fit: fit.chi2)
+
+    def _without(self, fit: Fit, index: int) -> Fit:
+        """The fit without one of its causes, a few steps on."""
+        structure, x = reduced(fit, index)
+        return refit(self.short, structure, x, 10, 1e-5)
 
     def _near(self, before: Fit, ranked: Sequence[Trial]) -> list[str]:
         """Ids that stood close behind the first of a stage."""
@@ -351,10 +355,9 @@ class Search(Sieve):
             rivals = [r for r in dict.fromkeys(rivals) if r not in present]
             if not rivals:
                 continue
-            structure, x = reduced(best, index)
-            without = refit(self.short, structure, x, 10, 1e-5)
+            without = self._without(best, index)
             if without.chi2 < best.chi2:  # it was in the way
-                return refit(self.short, structure, without.x, ALL, 1e-8)
+                return refit(self.short, without.structure, without.x, ALL, 1e-8)
             for trial in self.ranked(without, only=rivals)[:1]:
                 gained = without.chi2 - trial.fit.chi2
                 if trial.score >= score and gained > NEARLY * (without.chi2 - best.chi2):

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from bench.recording.types import Event, Recording, StepMark
@@ -202,3 +204,8 @@ def time_span(recording: Recording) -> tuple[float, float]:
         return 0.0, 1.0
     low, high = min(ends), max(ends)
     return low, high if high > low else low + 1.0
+
+
+def plain_numbers(axis: Axis) -> None:
+    """Ticks of a logarithmic axis as numbers: its own are markup, and no markup is drawn (svg.py)."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from bench.recording.types import Recording
@@ -125,7 +125,7 @@ def _curves(name: str, label: str, curves: Sequence[tuple[str, Curve]], x: str, 
             _band(ax, curve, colour, run, ("-", "--", "-.", ":")[(i // 7) % 4] if len(curves) > 7 else "-", log)
         if log:
             ax.set_xscale("log")
-            ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            parts.plain_numbers(ax.xaxis)
             ax.xaxis.set_minor_locator(NullLocator())
             ax.set_ylim(top=max(1.02, ax.get_ylim()[1]))
             low = ax.get_ylim()[0]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from bench.diagnose.result import Diagnosis
@@ -115,7 +115,7 @@ def view(chosen: View, *, named: bool = True) -> str:
         if chosen.logarithmic:
             ax.set_xscale("log")
             ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            parts.plain_numbers(ax.xaxis)
             ax.xaxis.set_minor_locator(NullLocator())
         if not spectrum:
             ax.axhline(0.0, color=light("muted"), lw=0.7)

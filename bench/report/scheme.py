@@ -90,7 +90,7 @@ def convergence(fit: FitView) -> str:
         [ax] = parts.panels(figure, [_HEIGHT], top=12.0)
         ax.plot(np.arange(1, V.size + 1), V, "-o", color=light("simulated"), lw=1.4, ms=3)
         ax.set_yscale("log")
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        parts.plain_numbers(ax.yaxis)
         ax.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}" if _few(ax) else ""))
         ax.set_xlabel("iteration")
         ax.set_ylabel("V, N²")
@@ -146,7 +146,7 @@ def over_times(of: OverTimes) -> str:
         low.minorticks_off()
         if np.nanmax(of.rates, initial=0.0) > 0:
             low.set_yscale("log")
-            low.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            parts.plain_numbers(low.yaxis)
         top.set_ylabel("law, over this fit's")
         low.set_ylabel("rate −ln p / T, 1/s")
         low.set_xlabel("sample time T, s")

@@ -67,7 +67,7 @@ class Parameter:
     """A choice of form, not fitted: it stays at the value given, or at its default."""
     bend: bool = False
     """A depth at which the force bends. Each depth held before or behind it makes a minimum of its own, so a fit starts
-    from many shares of the depth reached, whatever that is."""
+    from many shares of the depth reached, and not from `starts`."""
 
     def __post_init__(self) -> None:
         outside = [value for value in (*self.starts, self.if_left_out) if not self.lower <= value <= self.upper]

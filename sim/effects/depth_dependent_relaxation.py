@@ -115,16 +115,7 @@ EFFECT = Effect(
             what="rates linear in depth up to a knee",
             parameters=(
                 _SLOPE,
-                Parameter(
-                    "knee",
-                    "mm",
-                    0.1,
-                    1e3,
-                    1.5,
-                    "depth from which the rates stay as they are",
-                    starts=(0.7, 2.0),
-                    bend=True,
-                ),
+                Parameter("knee", "mm", 0.1, 1e3, 1.5, "depth from which the rates stay as they are", bend=True),
             ),
             sought=False,
             blocks={"rate": knee},

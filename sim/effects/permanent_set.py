@@ -145,9 +145,7 @@ EFFECT = Effect(
             what="at once, beyond a depth that leaves no trace",
             parameters=(
                 _SET,
-                Parameter(
-                    "limit", "mm", 0.0, 50.0, 0.5, "depth that leaves no trace", starts=(0.3, 1.0, 2.0), bend=True
-                ),
+                Parameter("limit", "mm", 0.0, 50.0, 0.5, "depth that leaves no trace", bend=True),
             ),
             blocks={"depth": yielding},
             state=(0.0,),

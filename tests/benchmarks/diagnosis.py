@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import tempfile
 import time
-from pathlib import Path
 
 import numpy as np
 
-from bench.config import load_model
-from bench.diagnose import diagnose
-from bench.recording import read_recording
 from tests.benchmarks.report import Goal, Section, Table, middle
+from tests.campaign.judge import diagnosed
 from tests.campaign.plan import catalogued
 from tests.truth.cases import PROTOCOLS, draw_case
 
@@ -37,16 +34,11 @@ def run() -> Section:
     _timed(None, "staircase")
     every: list[float] = []
     for protocol in PROTOCOLS:
-        wall, processor, right, names = [], [], 0, []
-        for id in (None, *catalogued("first")):
-            one = _timed(id, protocol)
-            wall.append(one[0])
-            processor.append(one[1])
-            right += one[2]
-            names.append(id or "nothing")
+        timed = {id or "nothing": _timed(id, protocol) for id in (None, *catalogued("first"))}
+        wall, processor, right = map(list, zip(*timed.values(), strict=True))
         within = sum(s <= WANTED_S for s in wall)
-        row = (protocol, middle(wall, "{:.1f}"), middle(processor, "{:.1f}"), str(len(wall)), str(within), str(right))
-        table.rows.append((*row, names[int(np.argmax(wall))]))
+        row = (protocol, middle(wall, "{:.1f}"), middle(processor, "{:.1f}"), str(len(wall)), str(within))
+        table.rows.append((*row, str(sum(right)), max(timed, key=lambda name: timed[name])))
         every += wall
     within = sum(s <= WANTED_S for s in every)
     text = f"{np.median(every):.1f} s at the median; {within} of {len(every)} within"
@@ -60,11 +52,6 @@ def _timed(id: str | None, protocol: str) -> tuple[float, float, bool]:
     coarse = draw_case(SEED, ids, 1.0, protocol=protocol, rate_hz=COARSE_HZ)
     case = draw_case(SEED, ids, 1.0, protocol=protocol, rate_hz=SAMPLES / float(coarse.time_s[-1]))
     with tempfile.TemporaryDirectory() as folder:
-        files: Path = case.write(folder)
-        data = read_recording(files / "data.csv").measurement()
-        believed = load_model(files / "believed.yaml")
-    start, used = time.perf_counter(), time.process_time()
-    result = diagnose(data, believed)
-    wall, processor = time.perf_counter() - start, time.process_time() - used
-    named = [cause.id for cause in result.causes][:1]
-    return wall, processor, named == list(ids)
+        line = diagnosed(case, case.write(folder))
+    named = [cause["id"] for cause in line["said"]["causes"][:1]]
+    return line["seconds"], line["cpu_seconds"], named == list(ids)
