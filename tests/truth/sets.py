@@ -1,9 +1,9 @@
-"""Which set a shape is of, by its module: `second_…`, `third_…`, `fourth_…`, `fifth_…`, `judge_…`, else `first`."""
+"""Which set a shape is of, by its module: `second_…`, `third_…` and so on, `judge_…`, else `first`."""
 
 from .effects import EFFECTS
 from .effects.registry import _FIRST, _JUDGE, _MORE, Hide
 
-SETS = ("first", "second", "third", "fourth", "fifth", "judge")
+SETS = ("first", "second", "third", "fourth", "fifth", "sixth", "judge")
 
 
 def _set(hide: Hide) -> str:

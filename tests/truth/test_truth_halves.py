@@ -19,12 +19,13 @@ RICH = (
     *("cogging", "inertia", "resonance", "force_drift", "force_delay", "sensor_lag", "clock_skew", "outliers"),
     "stuck_samples",
 )
-SHAPES = written_in(CATALOGUE, "third", "fourth", "fifth", "judge")
-BEYOND = written_in(tuple(outside(CATALOGUE, "third", "fourth", "fifth", "judge")), "third", "fourth", "fifth", "judge")
+LATER = ("third", "fourth", "fifth", "sixth", "judge")
+SHAPES = written_in(CATALOGUE, *LATER)
+BEYOND = written_in(tuple(outside(CATALOGUE, *LATER)), *LATER)
 
 
 def test_the_judge_keeps_to_itself():
-    least = {"third": 8, "fourth": 10, "fifth": 10, "judge": 10}
+    least = {"third": 8, "fourth": 10, "fifth": 10, "sixth": 10, "judge": 10}
     assert all(len(outside(CATALOGUE, name)) >= count for name, count in least.items())
     assert all(EFFECTS[id].judge for id in CATALOGUE) and all(len(EFFECTS[id].judge) >= 2 for id in RICH)
     for id, known in EFFECTS.items():
@@ -37,7 +38,7 @@ def test_the_judge_keeps_to_itself():
 def test_a_seed_draws_none_of_the_later_shapes():
     plain = {"motion": SHORT, "rate_hz": 200.0}
     drawn = {draw_case(seed, ("friction",), **plain).truth.shapes["friction"] for seed in range(12)}
-    later = shapes_of("friction", "second", "third", "fourth", "fifth", "judge")
+    later = shapes_of("friction", "second", "third", "fourth", "fifth", "sixth", "judge")
     assert later and drawn <= set(shapes_of("friction", "first"))
     for shape in later:
         assert draw_case(0, ("friction",), 1.0, shape, **plain).truth.shapes == {"friction": shape}

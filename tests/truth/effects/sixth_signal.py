@@ -1,4 +1,4 @@
-"""The judge's shapes: from the cell to the sample.
+"""The sixth shapes: from the cell to the sample.
 
 Sources: joints whose damping is dry (Den Hartog 1931; Bickford, bolted joints) and those that work loose (Junker
 1969); filters of finite response, a sinc within a window (Oppenheim and Schafer, Discrete-Time Signal Processing),
@@ -18,7 +18,7 @@ from scipy.signal import fftconvolve
 
 from .fourth_outside_bench import _wandering
 from .outside_bench import _child
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import _LAG, _RESONANCE, _disturb, first_order
 from .third_machine import _fundamental
 
@@ -43,7 +43,7 @@ def _dry(force, h, omega, damping, holds):
     return out
 
 
-@judge_shapes("resonance", "dry_joint", "works_loose")
+@more_shapes("resonance", "dry_joint", "works_loose")
 def resonance(build: Build, shape: str, size: float) -> dict[str, float]:
     """Half of the damping is dry, and ends the swing; or the frequency falls by a sixth to a third along the recording.
 
@@ -85,7 +85,7 @@ def windowed_sinc(steps: float) -> np.ndarray:
     return weights / weights.sum()
 
 
-@judge_shapes("sensor_lag", "finite_response", "hydraulic")
+@more_shapes("sensor_lag", "finite_response", "hydraulic")
 def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     """A sinc within a window, late by half of its length; or a cell of oil that drains more slowly than it fills.
 
@@ -107,7 +107,7 @@ def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"time_constant": tau}
 
 
-@judge_shapes("force_delay", "asked_again", "congestion")
+@more_shapes("force_delay", "asked_again", "congestion")
 def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
     """One answer in eight is lost and asked for anew, and comes twice as late; or a network more busy and less.
 
@@ -126,7 +126,7 @@ def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"delay": delay}
 
 
-@judge_shapes("clock_skew", "holdover", "tuning_fork")
+@more_shapes("clock_skew", "holdover", "tuning_fork")
 def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     """Right as long as it has its reference, then free; or a parabola, as the room warms, in no column of its own.
 
@@ -152,7 +152,7 @@ def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"skew": 1e6 * skew}
 
 
-@judge_shapes("force_bias", "returns_late")
+@more_shapes("force_bias", "returns_late")
 def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     """A part of it goes with the load that there was in the last seconds; stated is the mean over the recording.
 
@@ -171,7 +171,7 @@ def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     return told
 
 
-@judge_shapes("force_drift", "walks", "coarse_correction")
+@more_shapes("force_drift", "walks", "coarse_correction")
 def force_drift(build: Build, shape: str, size: float) -> dict[str, float]:
     """A straight line and a random walk besides; or one that is corrected in steps, as a thermometer tells of degrees.
 
@@ -191,7 +191,7 @@ def force_drift(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"rate": rate}
 
 
-@judge_shapes("mains_hum", "half_wave")
+@more_shapes("mains_hum", "half_wave")
 def mains_hum(build: Build, shape: str, size: float) -> dict[str, float]:
     """A rectifier of half waves, fed for 90 to 180 degrees of each; stated is the amplitude of the first harmonic."""
     rng = build.rng

@@ -1,4 +1,4 @@
-"""The judge's shapes: faults of the force channel.
+"""The sixth shapes: faults of the force channel.
 
 Sources: overload alarms with a hysteresis of their own (OIML R 76; Horowitz and Hill, The Art of Electronics);
 sparks, whose wave rings (IEC 61000-4-2), and numbers sent as text or as two's complement that have lost their sign;
@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, judge_shapes
+from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, more_shapes
 
 
 @njit(cache=True)
@@ -24,7 +24,7 @@ def _latched(force, high, low):
     return out
 
 
-@judge_shapes("saturation", "alarm")
+@more_shapes("saturation", "alarm")
 def saturation(build: Build, shape: str, size: float) -> dict[str, float]:
     """Above the limit an alarm shows the limit, until the force is 3 to 8 % below it again."""
     share = max(1 - 0.2 * size * float(build.rng.uniform(0.8, 1.2)), 0.3)
@@ -42,7 +42,7 @@ def saturation(build: Build, shape: str, size: float) -> dict[str, float]:
     return told
 
 
-@judge_shapes("outliers", "rings", "lost_sign")
+@more_shapes("outliers", "rings", "lost_sign")
 def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     """A spark that swings for three samples, each 0.7 of the last and the other way; or a number without its sign.
 
@@ -74,7 +74,7 @@ def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     return fraction
 
 
-@judge_shapes("stuck_samples", "checksum", "backs_off")
+@more_shapes("stuck_samples", "checksum", "backs_off")
 def stuck_samples(build: Build, shape: str, size: float) -> dict[str, float]:
     """Frames are lost one by one, nearly all of them while the motor moves; or a link that tries again, ever later.
 

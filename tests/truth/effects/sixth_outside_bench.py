@@ -1,4 +1,4 @@
-"""The judge's effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""The sixth effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together. Sources: force that goes past the cell,
 through dirt between its live and its dead end (VDI/VDE 2638; HBM, mounting of load cells); peak detectors (Horowitz
@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 
 from .fourth_outside_bench import _wandering
 from .outside_bench import _AMPLIFIER, _CELL, _child
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 from .sensor import _disturb
 from .third_outside_bench import _fades
 
@@ -32,7 +32,7 @@ def _relieved(force, share, least):
     return out
 
 
-@judge_effect("chip", "moves", "comes_and_goes")
+@effect("chip", "moves", "comes_and_goes")
 def chip(build: Build, shape: str, size: float) -> dict[str, float]:
     """A chip between the cell's live and dead end bears a part of what is beyond a force, each time beyond another.
 
@@ -65,7 +65,7 @@ def _holds_peak(force, h, tau):
     return out
 
 
-@judge_effect("peak_detector", "leaks", "window")
+@effect("peak_detector", "leaks", "window")
 def peak_detector(build: Build, shape: str, size: float) -> dict[str, float]:
     """An indicator left in its mode for peaks: it rises at once, and comes down by itself.
 
@@ -86,7 +86,7 @@ def peak_detector(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"lasts": tau}
 
 
-@judge_effect("flexed_cable", "crackles", "drops")
+@effect("flexed_cable", "crackles", "drops")
 def flexed_cable(build: Build, shape: str, size: float) -> dict[str, float]:
     """A broken strand in a cable that moves along: the gain is unquiet in motion and for 0.2 to 0.5 s after.
 
@@ -108,7 +108,7 @@ def flexed_cable(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"drop": drop, "settles": settles_s}
 
 
-@judge_effect("whipping_hose", "by_speed", "any_move")
+@effect("whipping_hose", "by_speed", "any_move")
 def whipping_hose(build: Build, shape: str, size: float) -> dict[str, float]:
     """A hose beside the cell whips as it is dragged, at 4 to 10 Hz, never twice the same way, and calms within 1 s.
 
@@ -128,7 +128,7 @@ def whipping_hose(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "frequency": frequency, "calms": calms_s}
 
 
-@judge_effect("levelling", "hunts", "bleeds")
+@effect("levelling", "hunts", "bleeds")
 def levelling(build: Build, shape: str, size: float) -> dict[str, float]:
     """A table on air whose valve has a dead band hunts: pad and probe go apart and together, every few seconds.
 

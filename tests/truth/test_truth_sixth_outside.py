@@ -1,10 +1,10 @@
-"""The judge's effects outside the catalogue: each is what its docstring says."""
+"""The sixth effects outside the catalogue: each is what its docstring says."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_outside_bench import _holds_peak, _relieved
-from .effects.judge_outside_pad import _presses, _skin
+from .effects.sixth_outside_bench import _holds_peak, _relieved
+from .effects.sixth_outside_pad import _presses, _skin
 from .motion import Path
 from .pad import Pad
 from .sets import SETS, outside, shapes_of
@@ -21,11 +21,11 @@ def touches(count, depth=1.8, hold_s=0.05, air_s=0.05, speed=20.0):
 
 
 def test_they_are_of_the_bench_or_of_the_pad():
-    mine = outside(CATALOGUE, "judge")
-    assert len(mine) == 11 and all(shapes_of(id, *SETS) == shapes_of(id, "judge") for id in mine)
+    mine = outside(CATALOGUE, "sixth")
+    assert len(mine) == 11 and all(shapes_of(id, *SETS) == shapes_of(id, "sixth") for id in mine)
 
 
-@pytest.mark.parametrize("shape", shapes_of("chip", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("chip", "sixth"))
 def test_a_chip_bears_a_part(shape):
     force = np.array([0.0, 5.0, 3.5, 5.0, 3.2, 2.5, 1.9, 3.0, 0.1, 0.0, 0.3, 0.0])
     assert np.array_equal(_relieved(force, 2 / 3, 0.4), [0, 0, 0, 0, 1, 1, 2, 2, 3, 3, 3, 3])
@@ -57,7 +57,7 @@ def test_a_detector_of_peaks():
     assert held[3500] == pytest.approx(2 * np.exp(-0.5), rel=5e-3) and held[-1] > -1.0
     assert np.array_equal(_holds_peak(-force, 1e-4, 1e-7), -force)
     motion = Path(-0.5).to(1.5, 20.0).hold(0.3).to(0.5, 100.0).hold(0.3).motion()
-    for shape in shapes_of("peak_detector", "judge"):
+    for shape in shapes_of("peak_detector", "sixth"):
         fine, told, _ = hidden("peak_detector", shape, 2.0, motion=motion)
         t, rises = fine.time_s, fine.time_s < 0.3
         assert np.array_equal(fine.force_N[rises], fine.cell_N[rises])
@@ -70,7 +70,7 @@ def test_a_detector_of_peaks():
             assert np.min(fine.force_N[t > 0.2]) > 1.4999
 
 
-@pytest.mark.parametrize("shape", shapes_of("flexed_cable", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("flexed_cable", "sixth"))
 def test_a_cable_that_is_unquiet_in_motion(shape):
     path = Path(0.5)
     for _ in range(12):
@@ -101,7 +101,7 @@ def test_a_hose_whips_as_it_is_dragged():
     t = np.arange(0, motion.duration_s, 1e-3)
     quick = [s for s in motion.breaks_s[:-1] if np.isclose(np.abs(motion.velocity(s + 1e-6)), 50.0)]
     slow = [s for s in motion.breaks_s[:-1] if np.isclose(np.abs(motion.velocity(s + 1e-6)), 2.0)]
-    for shape in shapes_of("whipping_hose", "judge"):
+    for shape in shapes_of("whipping_hose", "sixth"):
         _, told, build = hidden("whipping_hose", shape, motion=motion)
         swings = added(build, t)
         assert np.max(np.abs(swings)) == pytest.approx(told["amplitude"], rel=0.01)
@@ -118,7 +118,7 @@ def test_a_hose_whips_as_it_is_dragged():
         assert middle == pytest.approx(told["frequency"], rel=0.1)
 
 
-@pytest.mark.parametrize("shape", shapes_of("levelling", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("levelling", "sixth"))
 def test_a_table_that_hunts(shape):
     fine, told, _ = hidden("levelling", shape, motion=Path(1.0).hold(150.0).motion())
     height = (1.0 - fine.force_N[1:] / 3.0) / told["deviation"]
@@ -157,7 +157,7 @@ def test_a_crust_breaks_and_dries_anew():
     assert np.allclose(bears, wanted, rtol=2e-2)
 
 
-@pytest.mark.parametrize("shape", shapes_of("avalanches", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("avalanches", "sixth"))
 def test_avalanches_at_rest(shape):
     path = Path(0.5)
     for _ in range(20):
@@ -211,7 +211,7 @@ def test_a_cushion_that_walks():
     assert np.std(first - last[:-1]) < 0.5 * np.std(last) and np.std(last) > 0.3 * told["deviation"]
 
 
-@pytest.mark.parametrize("shape", shapes_of("tremor", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("tremor", "sixth"))
 def test_a_hand_that_trembles(shape):
     motion = Path(-0.5).hold(1.0).to(1.0, 50.0).hold(60.0).motion()
     fine, told, _ = hidden("tremor", shape, motion=motion)
@@ -226,7 +226,7 @@ def test_a_hand_that_trembles(shape):
     assert np.all(fine.force_N[t < 1] == 0) and (shape == "steady" or begins < 0.15 * level)
 
 
-@pytest.mark.parametrize("shape", shapes_of("clogging", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("clogging", "sixth"))
 def test_pores_clog(shape):
     pad = Pad(SPRING.law, (0.5,), (2.0,))
     motion = touches(16, hold_s=0.6, air_s=3.0)
@@ -250,7 +250,7 @@ def test_a_shell_with_two_states():
     x = np.interp(np.arange(300), [0, 99, 149, 199, 299], [0.0, 1.0, 0.6, 1.0, 0.0])
     assert np.array_equal(_presses(np.tile(x, 2), 0.9, 0.5)[[50, 99, 199, 250, 399]], [0, 1, 1, 1, 2])
     motion = touches(40)
-    for shape in shapes_of("two_states", "judge"):
+    for shape in shapes_of("two_states", "sixth"):
         fine, told, _ = hidden("two_states", shape, motion=motion)
         ends = motion.duration_s / 40 * (np.arange(40) + 1) - 0.09
         softer = (1 - fine.at(ends) / (3 * np.interp(ends, fine.time_s, fine.reported_mm))) / told["differs"]

@@ -1,11 +1,11 @@
-"""The judge's shapes from the cell to the sample, and of the channel's faults, against closed forms."""
+"""The sixth shapes from the cell to the sample, and of the channel's faults, against closed forms."""
 
 import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_signal import _dry, windowed_sinc
 from .effects.registry import SATURATION, Samples
+from .effects.sixth_signal import _dry, windowed_sinc
 from .motion import Path
 from .sets import shapes_of
 from .test_truth_effects import SHORT, disturbed, hidden
@@ -183,7 +183,7 @@ def test_an_alarm_that_shows_the_limit():
     assert np.array_equal(samples.force_N[~held], ramp[~held])
 
 
-@pytest.mark.parametrize("shape", shapes_of("outliers", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("outliers", "sixth"))
 def test_outliers(shape):
     case = draw_case(2, ("outliers",), 1.0, shape, **MANY)
     truth, hit = case.truth, case.truth.flags["outlier"]
@@ -199,7 +199,7 @@ def test_outliers(shape):
         assert np.allclose(case.force_N[hit], -truth.clean_N[hit], atol=6 * truth.noise.std)
 
 
-@pytest.mark.parametrize("shape", shapes_of("stuck_samples", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("stuck_samples", "sixth"))
 def test_stuck_samples(shape):
     case = draw_case(2, ("stuck_samples",), 1.0, shape, **MANY)
     stuck = case.truth.flags["stuck"]

@@ -1,10 +1,10 @@
-"""The judge's shapes of what lies between the motor and the pad against closed forms."""
+"""The sixth shapes of what lies between the motor and the pad against closed forms."""
 
 import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_machine import Bowed, _rattles
+from .effects.sixth_machine import Bowed, _rattles
 from .laws import Power
 from .motion import Path
 from .sets import shapes_of
@@ -34,10 +34,10 @@ def test_a_mount_of_rubber_in_the_frame(seed):
     assert given[-2] == pytest.approx(told["compliance"] * force[-2], rel=1e-4)
 
 
-@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "sixth"))
 @pytest.mark.parametrize("other", ["friction", "adhesion", "viscous_damping", "stress_softening", "damage"])
 def test_the_frame_goes_with_other_effects(shape, other):
-    shapes = {"frame_compliance": shape, other: shapes_of(other, "judge")[0]}
+    shapes = {"frame_compliance": shape, other: shapes_of(other, "sixth")[0]}
     plain = {"motion": SHORT, "rate_hz": 500.0, "law": "power", "contact": "unilateral"}
     truth = draw_case(7, ("frame_compliance", other), 1.0, shapes, **plain).truth
     fine, compliance = truth.fine, truth.parameters["frame_compliance"]["compliance"]

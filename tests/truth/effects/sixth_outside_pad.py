@@ -1,4 +1,4 @@
-"""The judge's effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""The sixth effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together. Sources: skins that dry and break (Routh
 2013, drying of thin films); avalanches after a load (Omori 1894, as of foams and crumpled sheets: Durian 1997, Matan,
@@ -16,7 +16,7 @@ from .fourth_outside_bench import _wandering
 from .fourth_outside_pad import _touches
 from .outside_bench import _child
 from .outside_pad import _added
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 
 
 @njit(cache=True)
@@ -36,7 +36,7 @@ def _skin(depth, h, breaks_mm, wears_mm, dries_s):
     return out
 
 
-@judge_effect("crust", "brittle", "wears")
+@effect("crust", "brittle", "wears")
 def crust(build: Build, shape: str, size: float) -> dict[str, float]:
     """In air a crust dries on the pad and bears with it, until it breaks; it takes 0.4 to 1.5 s to come back.
 
@@ -54,7 +54,7 @@ def crust(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"more": more, "dries": dries_s}
 
 
-@judge_effect("avalanches", "omori", "even")
+@effect("avalanches", "omori", "even")
 def avalanches(build: Build, shape: str, size: float) -> dict[str, float]:
     """At rest the pad gives way by jumps at random, of many sizes; the next move fills up what is missing.
 
@@ -89,7 +89,7 @@ def avalanches(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"drop": drop}
 
 
-@judge_effect("squirming", "each_touch", "wanders")
+@effect("squirming", "each_touch", "wanders")
 def squirming(build: Build, shape: str, size: float) -> dict[str, float]:
     """A cushion that lies loose walks from under the probe while it is pressed, or comes to lie better under it.
 
@@ -113,7 +113,7 @@ def squirming(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"deviation": deviation}
 
 
-@judge_effect("tremor", "steady", "tires")
+@effect("tremor", "steady", "tires")
 def tremor(build: Build, shape: str, size: float) -> dict[str, float]:
     """The pad is held by a hand or a muscle that trembles, at 7 to 12 Hz in bouts of a second or so.
 
@@ -137,7 +137,7 @@ def tremor(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"deviation": deviation, "frequency": frequency}
 
 
-@judge_effect("clogging", "each_touch", "in_bouts")
+@effect("clogging", "each_touch", "in_bouts")
 def clogging(build: Build, shape: str, size: float) -> dict[str, float]:
     """Pores clog and are flushed: all rates of relaxation are now slower and now quicker, whatever the depth.
 
@@ -171,7 +171,7 @@ def _presses(x, beyond_mm, back_mm):
     return out
 
 
-@judge_effect("two_states", "push_push", "at_random")
+@effect("two_states", "push_push", "at_random")
 def two_states(build: Build, shape: str, size: float) -> dict[str, float]:
     """A shell inside turns over when it is pressed beyond 0.35 to 0.5 of the depth, and stays so until the next time.
 

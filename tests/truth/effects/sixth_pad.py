@@ -1,4 +1,4 @@
-"""The judge's shapes of the pad's own effects. Those in which force and motion act on each other are forms of `kernel`.
+"""The sixth shapes of the pad's own effects. Those in which force and motion act on each other are forms of `kernel`.
 
 Sources: oil that comes out of rubber and makes it tacky (Creton and Ciccotti 2016); bonds that take as much surface
 as was pressed on (Bowden and Tabor, The Friction and Lubrication of Solids) and strands that break one by one (Gent
@@ -26,11 +26,11 @@ from ..laws import Law, _Tabulated
 from ..pad import Pad
 from .curves import stretched
 from .outside_bench import _child
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .structure import hide_law
 
 
-@judge_shapes("separation", "blooms")
+@more_shapes("separation", "blooms")
 def separation(build: Build, shape: str, size: float) -> dict[str, float]:
     """The lab believes `bonded`. What blooms out bears 0.5 % of the greatest force, and a tenth more each next time."""
     build.believed = replace(build.believed, contact="bonded")
@@ -38,7 +38,7 @@ def separation(build: Build, shape: str, size: float) -> dict[str, float]:
     return {}
 
 
-@judge_shapes("adhesion", "by_depth", "strands")
+@more_shapes("adhesion", "by_depth", "strands")
 def adhesion(build: Build, shape: str, size: float) -> dict[str, float]:
     """A neck that bears as much of P as it was pressed down; or four strands alike, which break one by one.
 
@@ -82,7 +82,7 @@ class Toe(_Tabulated):
         return self.modulus * (np.hypot(depth_mm, self.scale) - self.scale)
 
 
-@judge_shapes("elastic_law", "arruda_boyce", "toe")
+@more_shapes("elastic_law", "arruda_boyce", "toe")
 def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     """The true law is that of the name; the believed one is fitted to it. Sizes but 1 lie between (or beyond) both."""
     rng, depth = build.rng, build.depth_mm
@@ -109,7 +109,7 @@ def _visits(x):
     return out
 
 
-@judge_shapes("stress_softening", "gaussian", "conditioning")
+@more_shapes("stress_softening", "gaussian", "conditioning")
 def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
     """η = 1 − s (1 − e^{−q²}), q = (δ_max − δ)/d; or 1 − s_N (1 − e^{−q}), which takes some cycles to be whole.
 
@@ -129,7 +129,7 @@ def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"share": share, "depth": depth}
 
 
-@judge_shapes("damage", "two_kinds", "by_speed")
+@more_shapes("damage", "two_kinds", "by_speed")
 def damage(build: Build, shape: str, size: float) -> dict[str, float]:
     """A third of the bonds is weak and breaks four times as soon as the rest; or e^{−r Λ}, which costs more at speed.
 
@@ -149,7 +149,7 @@ def damage(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"rate": rate}
 
 
-@judge_shapes("permanent_set", "cold_flow", "bursts")
+@more_shapes("permanent_set", "cold_flow", "bursts")
 def permanent_set(build: Build, shape: str, size: float) -> dict[str, float]:
     """It grows with the logarithm of the time under load; or with the depth in bursts of many sizes.
 
@@ -202,7 +202,7 @@ def wedge_rates(rate: float, decades: float) -> tuple[np.ndarray, np.ndarray]:
     return weights, rate / (longest * times)
 
 
-@judge_shapes("missing_relaxation_mode", "gel", "wedge")
+@more_shapes("missing_relaxation_mode", "gel", "wedge")
 def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, float]:
     """A gel's water, a root of time at first; or a wedge of times, over a decade to a decade and a half.
 
@@ -223,7 +223,7 @@ def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, 
     return {"share": share, "rate": rate}
 
 
-@judge_shapes("depth_dependent_relaxation", "contact_radius", "thinner_layer")
+@more_shapes("depth_dependent_relaxation", "contact_radius", "thinner_layer")
 def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[str, float]:
     """Water goes as far as the contact is wide, ν ∝ 1/(1 + a δ); or as the layer is thick, ν ∝ 1/(1 − δ/H)².
 
@@ -248,7 +248,7 @@ def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[st
     return {"slope": slope}
 
 
-@judge_shapes("viscous_damping", "with_stiffness", "orifice")
+@more_shapes("viscous_damping", "with_stiffness", "orifice")
 def viscous_damping(build: Build, shape: str, size: float) -> dict[str, float]:
     """c v K(δ)/K(δ_ref), K the slope of the law and δ_ref half the greatest depth; or c |v| v/v_ref.
 

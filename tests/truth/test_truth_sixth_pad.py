@@ -1,9 +1,9 @@
-"""The judge's shapes of the pad's own effects against closed forms."""
+"""The sixth shapes of the pad's own effects against closed forms."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_pad import ArrudaBoyce, Toe, fitted_rates, gel, wedge_rates
+from .effects.sixth_pad import ArrudaBoyce, Toe, fitted_rates, gel, wedge_rates
 from .laws import Power
 from .motion import Path
 from .pad import Pad
@@ -158,7 +158,7 @@ def test_spectra_of_relaxation():
         assert np.log10(rates[-1] / rates[0]) == pytest.approx(decades, abs=0.13)
 
 
-@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "sixth"))
 def test_what_is_added_has_its_share(shape):
     pad = Pad(Power(3.0, 0.0), (0.3,), (50.0,))
     fine, told, build = hidden("missing_relaxation_mode", shape, pad=pad, motion=Path(2.0).hold(100.0).motion())
@@ -169,7 +169,7 @@ def test_what_is_added_has_its_share(shape):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("shape", shapes_of("depth_dependent_relaxation", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("depth_dependent_relaxation", "sixth"))
 def test_rates_by_depth(shape, seed):
     depths, rates = np.array([0.05, 0.5, 1.0, 1.5, 2.0]), []
     for depth in depths:
@@ -185,7 +185,7 @@ def test_rates_by_depth(shape, seed):
     assert slope > 0.05 if shape == "contact_radius" else slope < -0.02
 
 
-@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "sixth"))
 def test_damping(shape):
     pad = Pad(Power(3.0, 1.0))  # 3 δ²/2, so that K is 3 δ
     for speed in (5.0, 20.0, 60.0):

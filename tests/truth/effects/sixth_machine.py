@@ -1,4 +1,4 @@
-"""The judge's shapes of what lies between the motor and the pad.
+"""The sixth shapes of what lies between the motor and the pad.
 
 Sources: screws that are held at one end, whose stiffness goes with one over the free length (Slocum, Precision
 Machine Design), and mounts of rubber between plates (Rivin, Passive Vibration Isolation); lost motion under load (JIS
@@ -22,12 +22,12 @@ from numba import njit
 
 from ..laws import Law, _Tabulated
 from .outside_bench import _child
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import first_order
 from .third_machine import _fundamental, _sliding, _worn
 
 
-@judge_shapes("frame_compliance", "screw", "rubber_mount")
+@more_shapes("frame_compliance", "screw", "rubber_mount")
 def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     """A screw held at one end gives way more the further its nut is out; or rubber, a spring with a damper beside it.
 
@@ -44,7 +44,7 @@ def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"compliance": compliance}
 
 
-@judge_shapes("backlash", "under_load", "works_loose")
+@more_shapes("backlash", "under_load", "works_loose")
 def backlash(build: Build, shape: str, size: float) -> dict[str, float]:
     """The flanks give way, so that the width goes with the load; or a set screw works loose, the more the further.
 
@@ -89,7 +89,7 @@ class Bowed(_Tabulated):
         return self.law.model(depth_mm)
 
 
-@judge_shapes("contact_offset", "bowed")
+@more_shapes("contact_offset", "bowed")
 def contact_offset(build: Build, shape: str, size: float) -> dict[str, float]:
     """The surface lies elsewhere and the sample is bowed by up to 30 µm; stated is that of the mean height."""
     offset = float(build.rng.choice([-1.0, 1.0])) * 0.05 * size * spread(build.rng, 0.7, 1.4)
@@ -107,7 +107,7 @@ def _strokes(x: np.ndarray) -> np.ndarray:
     return np.cumsum(np.abs(np.diff(side, prepend=side[0])) > 0)
 
 
-@judge_shapes("friction", "smoothed", "viscous_rail", "each_stroke")
+@more_shapes("friction", "smoothed", "viscous_rail", "each_stroke")
 def friction(build: Build, shape: str, size: float) -> dict[str, float]:
     """A tanh of speed, nothing at rest; Coulomb's and more with speed; or a level that differs from stroke to stroke.
 
@@ -141,7 +141,7 @@ def _rattles(v, h, half_mm):
     return out
 
 
-@judge_shapes("inertia", "oil_ring", "rattles")
+@more_shapes("inertia", "oil_ring", "rattles")
 def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     """A quarter to two fifths of it turns or slides in oil, and comes late; or as much is loose within a clearance.
 
@@ -161,7 +161,7 @@ def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"mass": mass}
 
 
-@judge_shapes("cogging", "edges", "warms")
+@more_shapes("cogging", "edges", "warms")
 def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     """Edges of teeth and poles, Σ r^{n−1} sin n θ, r of 0.35 to 0.6; or a sine that fades as the magnets warm.
 
@@ -185,7 +185,7 @@ def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "period": period}
 
 
-@judge_shapes("encoder_error", "head_bends", "overdriven")
+@more_shapes("encoder_error", "head_bends", "overdriven")
 def encoder_error(build: Build, shape: str, size: float) -> dict[str, float]:
     """The head's bracket bends under load, and the error grows or fades; or sine and cosine are cut off at their tops.
 
