@@ -100,11 +100,15 @@ def hum_cause(line: Line) -> Cause:
     if line.fires_rad:
         return cause_of(hum, hum.form("dimmed"), values | {"fires": line.fires_rad})
     if line.higher:
-        words = {5: "fifth", 7: "seventh"}
-        none = {"fifth": 0.0, "seventh": 0.0, "ratio": 0.0}
-        own = {words[order]: ratio for order, ratio, _ in line.higher}
-        own |= {f"{words[order]}_phase": angle for order, _, angle in line.higher}
-        return cause_of(hum, hum.form("flat_topped"), values | none | third | own)
+        found = {3: (line.ratio, line.third_phase_rad)} | {order: (ratio, angle) for order, ratio, angle in line.higher}
+        if any(order % 2 == 0 for order in found):
+            words, form = {2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth", 7: "seventh"}, "distorted"
+        else:
+            words, form = {3: "ratio", 5: "fifth", 7: "seventh"}, "flat_topped"
+        own = {word: found.get(order, (0.0, 0.0))[0] for order, word in words.items()}
+        angles = {"ratio": "third_phase"}
+        own |= {angles.get(word, f"{word}_phase"): found.get(order, (0.0, 0.0))[1] for order, word in words.items()}
+        return cause_of(hum, hum.form(form), values | own)
     if third:
         return cause_of(hum, hum.form("harmonics"), values | third)
     return cause_of(hum, hum.form("sine"), values)

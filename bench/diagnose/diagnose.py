@@ -22,6 +22,8 @@ from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS, beyond_limit
 from .held_out import SEEN, held_out_square, later_square
+from .hum import Line
+from .hum import find as line_of
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
@@ -48,6 +50,7 @@ FAINT = 0.25  # of the noise power, that such a cause takes
 MOST = 0.5  # of what was left, that a cause leaves
 NEARLY_ALL = 0.9  # of the error beyond the noise
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
+SAME_LINE = 0.01  # of its frequency
 FADED = 0.25  # of its size as found
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
@@ -184,7 +187,7 @@ def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fi
     if mains is None:
         after = onto(last, full, 6, 1e-8)
     else:
-        data, structure = prepared.raw, last.structure.with_cause(hum_cause(mains))
+        data, structure = prepared.raw, last.structure.with_cause(hum_cause(_retimed(prepared, last, mains)))
         hum = structure.of_cause(len(structure.causes) - 1)
         own = structure.x(last.x[: len(structure.pad.coordinates)], None)[hum]
         after = refit(data, structure, extended(last, own), 8, 1e-8)
@@ -192,6 +195,20 @@ def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fi
     if prepared.felt.total_N.any():
         before, after = placed(full, before), placed(data, after)
     return before, after
+
+
+def _retimed(prepared: Prepared, fit: Fit, mains: Line) -> Line:
+    """The line by the times at which a fit has the forces felt. It was found by their stamps, and some parts in ten
+    thousand of its frequency are a whole wave within a minute."""
+    plant, raw = fit.structure.cascade(fit.x), prepared.raw
+    if not plant.shifts_time:
+        return mains
+    felt_s, counted = plant.felt_at(raw.time_s), prepared.at[raw.weight[prepared.at] > 0.0]
+    left_N = (raw.force_N - force_at(raw, fit.structure, fit.x))[counted]
+    stamps, begins_s = felt_s[counted], float(min(felt_s[0], raw.time_s[0]))
+    line = line_of(begins_s, [(stamps, left_N, left_N)], stamps, raw.force_N[counted])
+    near = line is not None and abs(line.frequency_Hz / mains.frequency_Hz - 1.0) < SAME_LINE
+    return line if line is not None and near and line.of_the_mains else mains
 
 
 def _faded(fits: list[Fit], whole: Fit) -> int | None:

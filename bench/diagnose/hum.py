@@ -28,7 +28,7 @@ OFF, STEADY = 0.05, 0.003  # of its frequency, by which a grid may be off, and b
 LEVEL = 1e-5  # of a line by chance, over all frequencies
 LEAST_SHARE = 0.002  # of the noise power
 TOLD = 15.0  # times the noise power per sample: what a further number of the line must take
-HARMONICS = (3, 5, 7)
+HARMONICS = tuple(range(2, 8))
 FIRES = tuple(np.deg2rad(np.arange(10.0, 160.0, 5.0)).tolist())  # angles of a dimmer
 WINDOW_S, FEWEST = 1.0, 20  # in which a line stands still while it swings slowly, and samples that tell of it there
 MOST_GROWTH = 2.0  # of the amplitude, from the least load of the holds to the greatest
@@ -36,7 +36,7 @@ MOST_GROWTH = 2.0  # of the amplitude, from the least load of the holds to the g
 
 @dataclass(frozen=True)
 class Line:
-    """Σ over harmonics (1, 3) of the sines found; `frequency_Hz`, `amplitude_N` and `phase_rad` of the first at t = 0,
+    """Σ over harmonics of the sines found; `frequency_Hz`, `amplitude_N` and `phase_rad` of the first at t = 0,
     `ratio` and `third_phase_rad` of the third (0 where there is none). All grows by `growth_1_N`, of itself, with each
     newton that the cell bears beyond `at_N`, where the amplitude is as stated. `higher`: (order, ratio, phase) of
     further harmonics. `swing`: (period in s, swell, its phase, wander in rad, its phase), as in the effect's form.
@@ -157,7 +157,7 @@ def _dimmed(line: Line, t: Array, e: Array) -> Line:
 
 
 def _with_harmonics(line: Line, t: Array, e: Array, least: float, highest: float, spacing: float) -> Line:
-    """The line with those of its odd harmonics that are more than chance, and do not look like each other."""
+    """The line with those of its harmonics that are more than chance, and do not look like each other."""
     f, rate = line.frequency_Hz, 1.0 / line.sample_s
     seen, found = [float(_folded(f, rate))], []
     for order in HARMONICS:

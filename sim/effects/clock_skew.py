@@ -6,6 +6,9 @@ Over the time T since the first force sample the force clock counts T (1 + skew 
 - `offset`: there they differ by `offset` already (force clock ahead). Without a skew it is a delay.
 - `ageing`: the skew grows or fades evenly, as of a quartz that warms up: skew · (1 + growth (t − at_time)). `at_time`
   is a choice and not fitted: the middle of the data, so that `skew` is its mean over them.
+- `held`: right as long as it has its reference, up to a share `free_from` of the data, and free from there (ITU-T
+  G.810, Definitions and terminology for synchronization networks: holdover). `skew` is the mean over the data, whose
+  middle is `at_time`.
 
 A single stamp without an array around it (a simulated device that is read out) counts from time 0.
 
@@ -38,6 +41,13 @@ def ageing(values: Mapping[str, float], stamp_s: Array) -> Array:
     since = stamp_s - origin
     gained = 1e-6 * values["skew"] * since * (1.0 + values["growth"] * (0.5 * since - values["at_time"]))
     return np.asarray(stamp_s - gained)
+
+
+def held(values: Mapping[str, float], stamp_s: Array) -> Array:
+    """When forces stamped `stamp_s` were felt, s."""
+    since, span = stamp_s - _origin(stamp_s), 2.0 * values["at_time"]
+    free = np.maximum(since - values["free_from"] * span, 0.0) / (1.0 - values["free_from"])
+    return np.asarray(stamp_s - 1e-6 * values["skew"] * free)
 
 
 _SKEW = Parameter(
@@ -79,6 +89,17 @@ EFFECT = Effect(
                 Parameter("at_time", "s", 0.0, 1e6, 30.0, "time since the first sample when it holds", fixed=True),
             ),
             time_shift=ageing,
+            sought=False,
+        ),
+        Form(
+            name="held",
+            what="together for a while, and apart from there",
+            parameters=(
+                _SKEW,
+                Parameter("free_from", "1", 0.0, 0.9, 0.2, "share of the data while they agree", starts=(0.2, 0.5)),
+                Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the time of which `skew` is the mean", fixed=True),
+            ),
+            time_shift=held,
             sought=False,
         ),
     ),

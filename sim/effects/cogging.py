@@ -10,6 +10,9 @@
 - `two_periods`: with a second sine of `order` waves for each of the first, which need not be whole: slots that are no
   multiple of the poles, and magnets that are not alike (J. R. Hendershot, T. J. E. Miller, Design of Brushless
   Permanent-Magnet Machines, 2nd ed., Motor Design Books, 2010).
+- `edged`: Σ r^(n−1) sin n θ, all harmonics, as of edges that are rounded over some of the period: sin θ over
+  1 − 2 r cos θ + r²; `amplitude` is that of the first.
+- `warming`: the sine fades or grows in time, as magnets weaken with warmth: amplitude · (1 + growth (t − at_time)).
 
 Reference: J. F. Gieras, Z. J. Piech, B. Z. Tomczuk, Linear Synchronous Motors: Transportation and Automation Systems,
 2nd ed., CRC Press, 2012 (cogging and detent force).
@@ -65,6 +68,21 @@ def two_periods(dt: float, y: float, state: State, p: State) -> float:
     """Force in N; p = (amplitude, period, phase, ratio, order, second_phase)."""
     angle = 2.0 * math.pi * y / p[1]
     return p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(p[4] * angle + p[5]))
+
+
+@block
+def edged(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, sharpness)."""
+    angle = 2.0 * math.pi * y / p[1] + p[2]
+    return p[0] * math.sin(angle) / (1.0 - 2.0 * p[3] * math.cos(angle) + p[3] * p[3])
+
+
+@block
+def warming(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, growth, at_time); state: time since the first sample."""
+    state[0] += dt
+    size = max(1.0 + p[3] * (state[0] - p[4]), 0.0)
+    return p[0] * size * math.sin(2.0 * math.pi * y / p[1] + p[2])
 
 
 def _of_the_first_harmonic(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -160,6 +178,32 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": two_periods},
+        ),
+        Form(
+            name="edged",
+            what="all harmonics, as of rounded edges",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("sharpness", "1", -0.9, 0.9, 0.4, "each harmonic over the one before", starts=(-0.4, 0.4)),
+            ),
+            sought=False,
+            blocks={"probe": edged},
+        ),
+        Form(
+            name="warming",
+            what="a sine that fades or grows in time",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("growth", "1/s", -0.2, 0.2, 0.0, "relative growth in time", starts=(-0.005, 0.005)),
+                Parameter("at_time", "s", 0.0, 1e6, 30.0, "time since the first sample when it holds", fixed=True),
+            ),
+            sought=False,
+            blocks={"probe": warming},
+            state=(0.0,),
         ),
     ),
 )

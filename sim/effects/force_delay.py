@@ -1,5 +1,10 @@
 """Force delay: a force sample was felt `delay` before its stamp, for transport, conversion or filtering on the way.
 
+- `constant`: the same for every sample.
+- `wandering`: delay · (1 + Σ c_k cos(kπ t/T)), k from 1 to 6, over the length T of the data, as of a network that is
+  now more and now less busy (V. Paxson, End-to-end internet packet dynamics, IEEE/ACM Trans. Netw. 7, 1999, 277–292).
+  `at_time` is the middle of the data, T/2, so that `delay` is its mean over them.
+
 Exact at any delay: the plant is run at the instants when the forces were felt, between samples of the position.
 
 Reference: L. Ljung, System Identification: Theory for the User, 2nd ed., Prentice Hall, 1999 (dead time).
@@ -7,7 +12,10 @@ Reference: L. Ljung, System Identification: Theory for the User, 2nd ed., Prenti
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+
+import numpy as np
 
 from sim.effects.base import Array, Effect, Form, Parameter
 
@@ -17,6 +25,33 @@ def late(values: Mapping[str, float], stamp_s: Array) -> Array:
     return stamp_s - values["delay"]
 
 
+def wandering(values: Mapping[str, float], stamp_s: Array) -> Array:
+    """When forces stamped `stamp_s` were felt, s."""
+    since = stamp_s - (float(stamp_s.flat[0]) if stamp_s.ndim and stamp_s.size else 0.0)
+    angle = 0.5 * math.pi * since / max(values["at_time"], 1e-9)
+    more = sum(values[f"wave_{k}"] * np.cos(k * angle) for k in WAVES)
+    return np.asarray(stamp_s - values["delay"] * np.maximum(1.0 + more, 0.0))
+
+
+WAVES = range(1, 7)
+_DELAY = Parameter(
+    "delay",
+    "s",
+    0.0,
+    1.0,
+    0.004,
+    "stamp of a force minus when it was felt, against the same of the position",
+    required=True,
+    amplitude=True,
+    floor=("sample_s", 0.05),
+    starts=(0.001, 0.004, 0.015),
+)
+
+
+def _wave(k: int) -> Parameter:
+    return Parameter(f"wave_{k}", "1", -0.6, 0.6, 0.0, f"{k} half waves over the data, over `delay`")
+
+
 EFFECT = Effect(
     id="force_delay",
     what="The force is stamped late against the position.",
@@ -24,24 +59,17 @@ EFFECT = Effect(
     check="measure both delays with `padbench doctor`; look at filter settings and polling of the load cell",
     reference="Ljung, System Identification, 2nd ed., 1999",
     forms=(
+        Form(name="constant", what="the same for every sample", parameters=(_DELAY,), time_shift=late),
         Form(
-            name="constant",
-            what="the same for every sample",
+            name="wandering",
+            what="now more and now less, as a network's",
             parameters=(
-                Parameter(
-                    "delay",
-                    "s",
-                    0.0,
-                    1.0,
-                    0.004,
-                    "stamp of a force minus when it was felt, against the same of the position",
-                    required=True,
-                    amplitude=True,
-                    floor=("sample_s", 0.05),
-                    starts=(0.001, 0.004, 0.015),
-                ),
+                _DELAY,
+                *(_wave(k) for k in WAVES),
+                Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the time of which it is the mean", fixed=True),
             ),
-            time_shift=late,
+            time_shift=wandering,
+            sought=False,
         ),
     ),
 )

@@ -32,6 +32,9 @@ since the last reversal, rises with it, and is a continuous function of position
 - `one_way`: Prandtl's element whose slider holds F_c (1 + differs) on the way in and F_c (1 − differs) on the way out,
   as of a seal whose lip points one way (B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer, 1991: the
   level depends on the direction). Wherever it slides, this is `coulomb` beside a bias; at the first sample it is none.
+- `smoothed`: F_c tanh(v/v_0), nothing at rest: what vibration makes of dry friction, and a film of oil (V.
+  Pervozvanski, C. Canudas de Wit, Asymptotic analysis of the dither effect in systems with friction, Automatica 38,
+  2002, 105–113).
 
 State: last position, force, whether there was a position yet. A first position is rest without friction force.
 """
@@ -201,6 +204,15 @@ def one_way(dt: float, y: float, state: State, p: State) -> float:
     force = max(-p[0] * (1.0 - p[1]), min(p[0] * (1.0 + p[1]), force))
     state[_FORCE] = force
     return force
+
+
+@block
+def smoothed(dt: float, y: float, state: State, p: State) -> float:
+    """A tanh of the speed; p = (coulomb, speed)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    return p[0] * math.tanh(moved / (dt * p[1])) if dt > 0.0 else 0.0
 
 
 def _term(name: str, what: str) -> Parameter:
@@ -396,6 +408,17 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": one_way},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="smoothed",
+            what="less and less as it comes to rest",
+            parameters=(
+                _COULOMB,
+                Parameter("speed", "mm/s", 1e-2, 20.0, 0.5, "speed by which it is there", starts=(0.2, 1.0, 4.0)),
+            ),
+            sought=False,
+            blocks={"probe": smoothed},
             state=(0.0, 0.0, 0.0),
         ),
     ),

@@ -17,6 +17,9 @@
 - `recoiling`: the bench gives way under the mass and swings at a few hertz: the mass feels the acceleration less a
   share of s²/(s² + 2 ζ ω s + ω²) of it, which is as if that share hung, damper and all (E. I. Rivin, Passive Vibration
   Isolation, ASME Press, 2003).
+- `oiled`: a share of the mass is dragged along by oil and comes late by a first order, as a ring that turns in its
+  housing (J. P. Den Hartog, Mechanical Vibrations, 4th ed., McGraw-Hill, 1956, section 3.3: Lanchester's damper). It is
+  hung from a damper, by a spring that is next to none.
 
 `mass` in kg, positions in mm: the force is mass/1000 · mm/s².
 
@@ -151,6 +154,16 @@ def _all_hung(values: Mapping[str, float]) -> tuple[float, ...]:
     return _packed({"share": 1.0, "window": 1e-3, **values})
 
 
+_LOOSE_HZ = 0.05
+"""Natural frequency of what hangs from a damper alone."""
+
+
+def _oiled(values: Mapping[str, float]) -> tuple[float, ...]:
+    # (2ζω s + ω²)/(s² + 2ζω s + ω²) is 1/(1 + τs) where 2ζω = 1/τ and ω is small
+    ratio = 0.5 / (2.0 * math.pi * _LOOSE_HZ * values["time_constant"])
+    return _packed({**values, "frequency": _LOOSE_HZ, "damping_ratio": ratio})
+
+
 EFFECT = Effect(
     id="inertia",
     what="The cell feels the force that accelerates the mass beyond it.",
@@ -234,6 +247,21 @@ EFFECT = Effect(
             blocks={"probe": rigid},
             state=(0.0,) * 17,
             pack=_packed,
+        ),
+        Form(
+            name="oiled",
+            what="a part of the mass is dragged along in oil, and comes late",
+            parameters=(
+                _MASS,
+                Parameter("share", "1", 0.0, 1.0, 0.35, "share of the mass that comes late"),
+                Parameter("time_constant", "s", 1e-3, 0.5, 0.02, "how late it comes", starts=(0.01, 0.03, 0.1)),
+                _WINDOW,
+                _LEAD,
+            ),
+            sought=False,
+            blocks={"probe": rigid},
+            state=(0.0,) * 17,
+            pack=_oiled,
         ),
     ),
 )

@@ -10,8 +10,14 @@ from sim.kernel import ramp_gain
 
 @compiled("UniTuple(float64, 2)(float64, float64, float64, float64, float64)")
 def swing(dt: float, e: float, de: float, omega: float, damping: float) -> tuple[float, float]:
-    """e and its derivative after dt of e'' + 2ζω e' + ω² e = 0, for a damping ratio ζ below 1."""
+    """e and its derivative after dt of e'' + 2ζω e' + ω² e = 0, for a damping ratio ζ other than 1."""
     decay = damping * omega
+    if damping > 1.0:  # no swing: two times, one of them long
+        apart = omega * math.sqrt(damping * damping - 1.0)
+        slow = math.exp(-omega * omega / (decay + apart) * dt)
+        fast = math.exp(-(decay + apart) * dt)
+        even, odd = 0.5 * (slow + fast), 0.5 * (slow - fast) / apart
+        return e * even + (de + decay * e) * odd, de * even - (omega * omega * e + decay * de) * odd
     omega_d = omega * math.sqrt(1.0 - damping * damping)
     fade = math.exp(-decay * dt)
     c = math.cos(omega_d * dt)

@@ -7,6 +7,7 @@ Phases are at the first sample.
 - `flat_topped`: with the third, the fifth and the seventh, as rectifiers make that draw from the crests alone.
 - `dimmed`: a dimmer lets each half wave through from an angle `fires` on (IEC 61000-3-2); `amplitude` is that of the
   first harmonic, `phase` that of the mains.
+- `distorted`: with all harmonics from the second to the seventh; rectifiers of half waves make the even ones.
 - `swinging`: amplitude and phase swing slowly, amplitude · (1 + swell · sin(2πt/period + …)) ·
   sin(2πft + phase + wander · sin(2πt/period + …)), as the grid's frequency does and what else it feeds.
 - `loaded`, `loaded_harmonics`: the same, times 1 + growth · (F − at_force) of the force F at the cell. A bridge
@@ -73,6 +74,17 @@ def _whole(values: Mapping[str, float]) -> tuple[float, ...]:
 
 
 @block
+def distorted(dt: float, force: float, state: State, p: State) -> float:
+    """Force with the hum; p = (amplitude, frequency, phase), then (ratio, phase) of the second to the seventh."""
+    state[0] += dt
+    angle = 2.0 * math.pi * p[1] * state[0]
+    wave = math.sin(angle + p[2])
+    for k in range(6):
+        wave += p[3 + 2 * k] * math.sin((k + 2.0) * angle + p[4 + 2 * k])
+    return force + p[0] * wave
+
+
+@block
 def swinging(dt: float, force: float, state: State, p: State) -> float:
     """p = (amplitude, frequency, phase, period, swell, swell_phase, wander, wander_phase)."""
     state[0] += dt
@@ -122,6 +134,14 @@ _HIGHER = (
     phase("fifth_phase", "phase of the fifth harmonic at the first sample"),
     Parameter("seventh", "1", 0.0, 3.0, 0.05, "seventh harmonic over the first"),
     phase("seventh_phase", "phase of the seventh harmonic at the first sample"),
+)
+_EACH = tuple(
+    p
+    for name in ("second", "third", "fourth", "fifth", "sixth", "seventh")
+    for p in (
+        Parameter(name, "1", 0.0, 3.0, 0.2, f"{name} harmonic over the first"),
+        phase(f"{name}_phase", f"phase of the {name} harmonic at the first sample"),
+    )
 )
 _SWING = (
     Parameter("period", "s", 0.5, 1e4, 30.0, "time of a swing"),
@@ -177,6 +197,14 @@ EFFECT = Effect(
             blocks={"sensor": dimmed},
             state=(0.0,),
             pack=_whole,
+        ),
+        Form(
+            name="distorted",
+            what="a sine and its harmonics up to the seventh",
+            parameters=(_AMPLITUDE, _FREQUENCY, _PHASE, *_EACH),
+            sought=False,
+            blocks={"sensor": distorted},
+            state=(0.0,),
         ),
         Form(
             name="swinging",

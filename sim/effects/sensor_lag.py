@@ -17,6 +17,11 @@ value. Each is exact for a force that is linear between samples, at any spacing.
 - `decimator`: the mean over 2wτ around the time τ ago. With w = 1/√3 delay and width are those of three running means
   in a row, as of a converter's sinc³ decimator (E. B. Hogenauer, IEEE Trans. Acoust. Speech Signal Process. 29, 1981,
   155–162).
+- `finite`: the same of any width w: weights that are even about their middle let the force come late by half their
+  length, and smooth it the less, the sharper their passband ends (A. V. Oppenheim, R. W. Schafer, Discrete-Time Signal
+  Processing, 3rd ed., Prentice Hall, 2010, chapter 7).
+- `throttled`: 1/(1 + τ(1 − u)s) as the force rises and 1/(1 + τ(1 + u)s) as it falls, as of a hydraulic cell behind a
+  throttle with a valve (Doebelin, chapter 6). A step that begins on one side of the force ends on it.
 
 Reference: E. O. Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3 (first
 and second order instruments and their response to a ramp); A. I. Zverev, Handbook of Filter Synthesis, Wiley, 1967
@@ -60,6 +65,20 @@ def partly(dt: float, u: float, state: State, p: State) -> float:
         state[_Y] = y
     state[_LAST] = u
     return u + p[1] * (state[_Y] - u)
+
+
+@block
+def throttled(dt: float, u: float, state: State, p: State) -> float:
+    """One pole, of one time as the output rises and another as it falls; p = (time_constant, uneven)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+    else:
+        rises = 0.5 * (state[_LAST] + u) > state[_Y]
+        y = lagged(dt, state[_Y], state[_LAST], u, p[0] * (1.0 - p[1] if rises else 1.0 + p[1]))
+        state[_Y] = y
+    state[_LAST] = u
+    return state[_Y]
 
 
 @block
@@ -350,6 +369,30 @@ EFFECT = Effect(
             ),
             blocks={"sensor": moving_average},
             state=(0.0,) * (_RING + 3 * KNOTS),
+        ),
+        Form(
+            name="finite",
+            what="a mean about a time ago, as of filters of finite response",
+            parameters=(
+                _TIME_CONSTANT,
+                Parameter("width", "1", 0.02, 1.0, 0.3, "window over twice the time constant", starts=(0.15, 0.4)),
+            ),
+            sought=False,
+            blocks={"sensor": moving_average},
+            state=(0.0,) * (_RING + 3 * KNOTS),
+        ),
+        Form(
+            name="throttled",
+            what="one pole, quicker as the force rises than as it falls, or the other way round",
+            parameters=(
+                _TIME_CONSTANT,
+                Parameter(
+                    "uneven", "1", -0.8, 0.8, 0.2, "what falling takes more, of itself", default=0.0, starts=(-0.3, 0.3)
+                ),
+            ),
+            sought=False,
+            blocks={"sensor": throttled},
+            state=(0.0,) * 3,
         ),
     ),
 )

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.signal import lsim
 
+from sim.effects import effect
 from sim.effects.mains_hum import first_of_dimmed
 from sim.elastic import Exponential
 from sim.pad import Cascade, Pad
@@ -130,3 +131,84 @@ def test_hum_of_a_dimmer() -> None:
         assert_allclose(
             first_of_dimmed(fires), [2 * np.mean(cut * np.sin(angle)), 2 * np.mean(cut * np.cos(angle))], atol=1e-4
         )
+
+
+def test_hum_with_all_its_harmonics() -> None:
+    t = np.arange(20_000) * 1e-5
+    names = ("second", "third", "fourth", "fifth", "sixth", "seventh")
+    shares = dict(zip(names, (0.5, 0.2, 0.0, 0.1, 0.05, 0.3), strict=True))
+    phases = {f"{name}_phase": 0.3 * k for k, name in enumerate(names)}
+    hum = active("mains_hum", "distorted", amplitude=0.1, frequency=50.0, phase=0.7, **shares, **phases)
+    spectrum = np.fft.rfft(sense(hum, t, np.zeros(t.size))) / 10_000
+    assert_allclose(np.abs(spectrum[10:80:10]), 0.1 * np.array([1.0, *shares.values()]), atol=1e-9)
+    assert_allclose(np.angle(spectrum[[20, 70]]) + math.pi / 2, [0.0, 1.5], atol=1e-6)
+
+
+def test_a_delay_that_wanders() -> None:
+    stamps = 5.0 + np.linspace(0.0, 40.0, 4001)
+    waves = {f"wave_{k}": 0.0 for k in range(1, 7)} | {"wave_1": -0.2, "wave_4": 0.3}
+    wanders = effect("force_delay").form("wandering")
+    assert wanders.time_shift is not None
+    late = stamps - wanders.time_shift({"delay": 0.004, "at_time": 20.0, **waves}, stamps)
+    share = np.linspace(0.0, 1.0, 4001)
+    assert_allclose(late, 0.004 * (1 - 0.2 * np.cos(math.pi * share) + 0.3 * np.cos(4 * math.pi * share)), atol=1e-12)
+    assert_allclose(np.trapezoid(late, share), 0.004, rtol=1e-6)
+
+
+def test_a_clock_that_loses_its_reference() -> None:
+    stamps = 5.0 + np.linspace(0.0, 40.0, 401)
+    held = effect("clock_skew").form("held")
+    assert held.time_shift is not None
+    late = stamps - held.time_shift({"skew": 200.0, "free_from": 0.25, "at_time": 20.0}, stamps)
+    assert_allclose(late[[0, 50, 100, 250, 400]], [0.0, 0.0, 0.0, 0.004, 0.008], atol=1e-12)
+
+
+def test_a_filter_of_finite_response() -> None:
+    t = np.linspace(0.0, 0.4, 4001)
+    filtered = active("sensor_lag", "finite", time_constant=0.02, width=0.25)
+    assert_allclose(sense(filtered, t, 3.0 * t)[500:], 3.0 * (t[500:] - 0.02), atol=1e-9)
+    step = sense(filtered, t, np.where(t > 0.1 - 1e-9, 1.0, 0.0))
+    assert_allclose(np.interp([0.114, 0.12, 0.1225, 0.126], t, step), [0.0, 0.5, 0.75, 1.0], atol=0.02)
+
+
+def test_a_cell_that_drains_more_slowly_than_it_fills() -> None:
+    t = np.linspace(0.0, 2.0, 20_001)
+    force = np.interp(t, [0.0, 0.5, 1.0, 1.0001], [0.0, 1.0, 1.0, 0.0])
+    out = sense(active("sensor_lag", "throttled", time_constant=0.02, uneven=0.3), t, force)
+    assert_allclose(np.interp(0.4, t, out), 0.8 - 2.0 * 0.014, rtol=1e-6)
+    assert_allclose(np.interp([1.0101, 1.0301], t, out), np.exp(-np.array([0.01, 0.03]) / 0.026), rtol=3e-3)
+
+
+def test_friction_that_vibration_smooths() -> None:
+    x = np.concatenate([np.linspace(0.0, 1.0, 101), np.full(10, 1.0), np.linspace(1.0, 0.0, 51)[1:]])
+    smoothed = active("friction", "smoothed", coulomb=0.3, speed=2.0)
+    force = simulate(AIR, [smoothed], 0.01 * np.arange(x.size), x)
+    assert_allclose(force[1:101], 0.3 * math.tanh(0.5), rtol=1e-9)
+    assert_allclose(force[101:111], 0.0, atol=1e-12)
+    assert_allclose(force[111:], -0.3 * math.tanh(1.0), rtol=1e-9)
+
+
+def test_cogging_of_edges_has_all_harmonics() -> None:
+    x = np.arange(1000) / 1000 * 2.0
+    edged = active("cogging", "edged", amplitude=0.2, period=2.0, phase=0.0, sharpness=0.5)
+    spectrum = np.fft.rfft(simulate(AIR, [edged], np.arange(1000.0), x)) / 500
+    assert_allclose(-spectrum.imag[1:6], 0.2 * 0.5 ** np.arange(5), rtol=1e-9)
+
+
+def test_cogging_that_fades_in_time() -> None:
+    t = np.linspace(0.0, 40.0, 401)
+    x = np.linspace(0.0, 3.0, 401)
+    warm = active("cogging", "warming", amplitude=0.2, period=2.0, phase=0.3, growth=-0.01, at_time=20.0)
+    wanted = 0.2 * (1.0 - 0.01 * (t - 20.0)) * np.sin(math.pi * x + 0.3)
+    assert_allclose(simulate(AIR, [warm], t, x), wanted, atol=1e-12)
+
+
+def test_a_mass_in_oil_comes_late() -> None:
+    """A move at steady acceleration: the share in oil is felt by 1 − e^(−t/τ)."""
+    t = np.arange(0.0, 0.4, 2e-4)
+    x = 0.5 * 200.0 * t**2
+    numbers = {"mass": 0.2, "share": 0.4, "time_constant": 0.03, "window": 1e-3, "lead": 0.0}
+    force = simulate(AIR, [active("inertia", "oiled", **numbers)], t, x)
+    wanted = 0.2 * 0.2 * (0.6 + 0.4 * -np.expm1(-t / 0.03))
+    late = (t > 0.01) & (t < 0.2)
+    assert_allclose(force[late], wanted[late], rtol=0.02)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from bench.diagnose import hum, swing
+from bench.diagnose import diagnose, hum, swing
 from bench.diagnose.channel import faults, of_the_model
 from bench.diagnose.channel_causes import joined
 from bench.diagnose.data import Data
@@ -16,8 +16,10 @@ from bench.diagnose.refit import Fit
 from bench.diagnose.result import CauseFound
 from sim.effects import effect
 from sim.elastic import Exponential
+from sim.model import Model
 from sim.pad import Pad
 from sim.relaxation import Relaxation
+from tests.bench.diagnose.small import measurement
 from tests.truth.cases import draw_case
 
 SAMPLE_s = 0.002
@@ -261,7 +263,7 @@ def test_a_line_that_grows_with_the_load_is_stated_at_the_mean_force():
         assert np.std(e - line.force_N(t, load)) == pytest.approx(0.01, rel=0.03)
 
 
-@pytest.mark.parametrize("shape", ["sine", "odd harmonics", "swells", "wanders", "let through late"])
+@pytest.mark.parametrize("shape", ["sine", "odd harmonics", "one way", "swells", "wanders", "let through late"])
 def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
     for seed in SEEDS:
         rng = np.random.default_rng(seed)
@@ -271,6 +273,9 @@ def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
         angle = 2 * np.pi * 50.0 * t + (0.4 * slow if shape == "wanders" else 0.0)
         tops = np.sin(3 * angle) / 5 - np.sin(5 * angle + 0.2) / 10 if shape == "odd harmonics" else 0.0
         clean = 0.03 * (swells * np.sin(angle + 0.5) + tops)
+        if shape == "one way":  # a rectifier of half waves, from a quarter of the crest on
+            clean = 0.06 * np.maximum(np.sin(angle + 0.5) - 0.25, 0.0)
+            clean -= np.mean(clean)
         if shape == "let through late":
             mains = 2 * np.pi * 50.0 * t + 2.1
             clean = 0.03 * np.sin(mains) * (mains % np.pi > 1.2)
@@ -278,10 +283,24 @@ def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
         line = hum.find(0.0, _holds(t, e, 4500), t, e)
         assert line is not None
         assert bool(line.swing) == (shape in ("swells", "wanders"))
-        assert [order for order, _, _ in line.higher] == ([5] if shape == "odd harmonics" else [])
+        others = {"odd harmonics": [5], "one way": [2, 4, 5, 7]}  # its sixth is 0.01 of the noise
+        assert [order for order, _, _ in line.higher] == others.get(shape, [])
         assert line.growth_1_N == 0.0
         assert line.fires_rad == pytest.approx(1.2 if shape == "let through late" else 0.0, abs=0.05)
         assert np.std(line.force_N(t, np.zeros(len(t))) - clean) < 1.5e-3
+
+
+def test_a_line_is_told_by_the_times_at_which_forces_were_felt():
+    """A clock that gains 200 microseconds a second turns a hum by half a wave within a minute of its stamps."""
+    for seed in (1, 2):
+        kinds = {"protocol": "staircase", "noise_kind": "white", "own_clock": True}
+        c = draw_case(seed, ("clock_skew", "mains_hum"), 1.0, rate_hz=240.0, **kinds)
+        found = {cause.id: cause for cause in diagnose(measurement(c), Model.from_dict(c.believed)).causes}
+        for name, true in c.truth.parameters["mains_hum"].items():
+            assert found["mains_hum"].parameters[name].value == pytest.approx(true, rel=0.02)
+        assert found["clock_skew"].parameters["skew"].value == pytest.approx(
+            c.truth.parameters["clock_skew"]["skew"], rel=0.1
+        )
 
 
 def test_what_sways_at_a_frequency_of_its_own_is_seen_and_noise_is_not():
