@@ -10,6 +10,9 @@
 - `running_out`: the width goes with the place, gap · (1 + swell · sin(2π x/turn + angle)): a gear, pulley or screw that
   runs out, or is worn where it is used most (ISO 230-2: the reversal value is stated for each
   place). `gap` is the mean.
+- `wearing`: gap · (1 + growth (t − at_time)), as of screws that work loose under load that comes and goes (G. H.
+  Junker, New criteria for self-loosening of fasteners under vibration, SAE Technical Paper 690055, 1969), or of a nut
+  that warms.
 - `closing`: what has opened closes again under the preload, within `time_constant`: a nut or joint full of grease, of
   which the film is pressed out (J. Stefan, Versuche über die scheinbare Adhäsion, Sitzungsber. Akad. Wiss. Wien 69,
   1874, 713–735: the thinner the film, the slower; near one thickness, as an exponential).
@@ -88,6 +91,18 @@ def closing(dt: float, x: float, state: State, p: State) -> float:
     state[1] = x
     state[2] = min(max(opened, 0.0), p[0])
     return x + state[2]
+
+
+@block
+def wearing(dt: float, x: float, state: State, p: State) -> float:
+    """Probe side, from x to x + what is open by then; p = (gap, growth, at_time). State: started, probe, time."""
+    state[2] += dt
+    gap = p[0] * max(1.0 + p[1] * (state[2] - p[2]), 0.0)
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[1] = x
+    state[1] = min(max(state[1], x), x + gap)
+    return state[1]
 
 
 @block
@@ -170,6 +185,18 @@ EFFECT = Effect(
             sought=False,
             blocks={"play": running_out},
             state=(0.0, 0.0),
+        ),
+        Form(
+            name="wearing",
+            what="rigid stops that part as time goes by, or come together",
+            parameters=(
+                _GAP,
+                Parameter("growth", "1/s", -0.2, 0.2, 0.0, "relative growth in time", starts=(-0.01, 0.01)),
+                Parameter("at_time", "s", 0.0, 1e6, 30.0, "time since the first sample when it holds", fixed=True),
+            ),
+            sought=False,
+            blocks={"play": wearing},
+            state=(0.0, 0.0, 0.0),
         ),
         Form(
             name="closing",

@@ -6,6 +6,8 @@
   quadrature fringe measurement errors in interferometers, Appl. Opt. 20, 1981, 3382–3384).
 - `fading`: the sine fades or grows along the way, where the head is not parallel to its scale: amplitude ·
   (1 + growth (true − at_depth)), within 0 and twice the amplitude.
+- `leaning`: the sine grows or fades with a power of the depth, as the bracket of a head bends under the load:
+  amplitude · (1 + growth ((true/reach)^power − ½)), within 0 and twice the amplitude. `amplitude` is that at half of the load.
 
 A reported position must rise with the true one; an error so steep that it would not is taken as the steepest that does.
 """
@@ -40,6 +42,21 @@ def fading(dt: float, x: float, state: State, p: State) -> float:
     """Reported position; p = (amplitude, wave number, phase, growth, at_depth)."""
     size = min(max(1.0 + p[3] * (x - p[4]), 0.0), 2.0)
     return x + p[0] * size * math.sin(p[1] * x + p[2])
+
+
+@block
+def leaning(dt: float, x: float, state: State, p: State) -> float:
+    """Reported position; p = (amplitude, wave number, phase, growth, power, reach)."""
+    loaded = (max(x, 0.0) / p[5]) ** p[4]
+    size = min(max(1.0 + p[3] * (loaded - 0.5), 0.0), 2.0)
+    return float(x + p[0] * size * math.sin(p[1] * x + p[2]))
+
+
+def _packed_leaning(values: Mapping[str, float]) -> tuple[float, ...]:
+    wave_number = 2.0 * math.pi / values["period"]
+    growth, power, reach = values["growth"], values["power"], values["reach"]
+    amplitude = min(values["amplitude"], _STEEPEST / (2.0 * wave_number + 1.5 * power * abs(growth) / reach))
+    return (amplitude, wave_number, values["phase"], growth, power, reach)
 
 
 def _packed_fading(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -105,6 +122,21 @@ EFFECT = Effect(
             parameters=(_AMPLITUDE, _PERIOD, PHASE, *GROWTH),
             blocks={"report": fading},
             pack=_packed_fading,
+        ),
+        Form(
+            name="leaning",
+            what="a sine that grows or fades with the load",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("growth", "1", -1.5, 1.5, 0.0, "what the greatest load adds to it", starts=(-0.7, 0.7)),
+                Parameter("power", "1", 1.0, 4.0, 1.6, "power of the depth that the load goes with"),
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth of the greatest load", fixed=True),
+            ),
+            sought=False,
+            blocks={"report": leaning},
+            pack=_packed_leaning,
         ),
     ),
 )

@@ -8,6 +8,8 @@ From a tare while something touched, a cable that pulls, a probe changed after t
   elsewhere.
 - `along`: bias · (1 + share (y/reach − ½)) at the probe's position y, as of a cable or tube that is pulled along: it is
   a weak spring. It hangs free further than half the reach beyond either end.
+- `returning`: bias · (1 + share (G/at_force − ½)), G the force of the last seconds, by a first order: cells are slow to
+  come back to zero after a load, and come back the later, the longer it lasted.
 
 The share is small: a zero that moves by more of itself than that drifts. A drift begins at zero; a bias is there from
 the first sample on.
@@ -21,6 +23,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.linear import first_order
 from sim.jit import State, block
 
 _MOST = 0.3  # of the bias, by which it may change
@@ -50,6 +53,14 @@ def slipping(dt: float, force: float, state: State, p: State) -> float:
 def along(dt: float, y: float, state: State, p: State) -> float:
     """Force at the probe; p = (bias, share, reach)."""
     return p[0] * (1.0 + p[1] * (min(max(y / p[2], -0.5), 1.5) - 0.5))
+
+
+@block
+def returning(dt: float, force: float, state: State, p: State) -> float:
+    """p = (bias, share, time_constant, at_force). State: force before, G."""
+    state[1] = first_order(dt, state[1], state[0], force, p[2])
+    state[0] = force
+    return force + p[0] * (1.0 + p[1] * (min(max(state[1] / p[3], -0.5), 1.5) - 0.5))
 
 
 _BIAS = Parameter(
@@ -101,6 +112,19 @@ EFFECT = Effect(
             sought=False,
             blocks={"sensor": slipping},
             state=(0.0,),
+        ),
+        Form(
+            name="returning",
+            what="a little more or less after a load",
+            parameters=(
+                _BIAS,
+                _share("what there is more of it after the force stated than after none"),
+                Parameter("time_constant", "s", 0.5, 300.0, 6.0, "time in which it comes back", starts=(3.0, 12.0)),
+                Parameter("at_force", "N", 1e-3, 1e6, 5.0, "force that adds the share", fixed=True),
+            ),
+            sought=False,
+            blocks={"sensor": returning},
+            state=(0.0, 0.0),
         ),
         Form(
             name="along",

@@ -212,3 +212,29 @@ def test_a_mass_in_oil_comes_late() -> None:
     wanted = 0.2 * 0.2 * (0.6 + 0.4 * -np.expm1(-t / 0.03))
     late = (t > 0.01) & (t < 0.2)
     assert_allclose(force[late], wanted[late], rtol=0.02)
+
+
+def test_a_zero_that_is_late_to_come_back() -> None:
+    t = np.linspace(0.0, 40.0, 4001)
+    force = np.where((t > 10.0) & (t <= 20.0), 4.0, 0.0)
+    late = active("force_bias", "returning", bias=0.1, share=0.2, time_constant=5.0, at_force=4.0)
+    zero = (sense(late, t, force) - force) / 0.1 - 1.0
+    wanted = 0.2 * (np.array([0.0, -np.expm1(-1.0), -np.expm1(-2.0) * math.exp(-1.0)]) - 0.5)
+    assert_allclose(np.interp([5.0, 15.0, 25.0], t, zero), wanted, atol=1e-3)
+
+
+def test_play_of_what_works_loose() -> None:
+    loose = active("backlash", "wearing", gap=0.1, growth=0.02, at_time=20.0)
+    x = np.interp(np.arange(40.0), [0.0, 5.0, 10.0, 30.0, 35.0, 39.0], [0.0, 1.0, 0.0, 0.0, 1.0, 0.2])
+    _, probe = Cascade(LINEAR, [loose]).probe(np.arange(40.0), x)
+    assert_allclose((probe - x)[[4, 10, 35, 39]], [0.0, 0.1 * 0.8, 0.0, 0.1 * 1.38], atol=1e-12)
+
+
+def test_an_encoder_whose_head_leans_under_load() -> None:
+    x = np.linspace(-0.5, 2.0, 26)
+    leans = effect("encoder_error").form("leaning")
+    numbers = {"amplitude": 0.01, "period": 0.8, "phase": 0.3, "growth": 0.6, "power": 2.0, "reach": 2.0}
+    block, vector = leans.blocks["report"], np.array(leans.vector(numbers))
+    reported = np.array([block(0.0, here, np.zeros(1), vector) for here in x])
+    size = 1.0 + 0.6 * ((np.maximum(x, 0.0) / 2.0) ** 2 - 0.5)
+    assert_allclose(reported - x, 0.01 * size * np.sin(2 * math.pi * x / 0.8 + 0.3), atol=1e-12)
