@@ -7,7 +7,8 @@
 - `fading`: the sine fades or grows along the way, where the head is not parallel to its scale: amplitude ·
   (1 + growth (true − at_depth)), within 0 and twice the amplitude.
 - `leaning`: the sine grows or fades with a power of the depth, as the bracket of a head bends under the load:
-  amplitude · (1 + growth ((true/reach)^power − ½)), within 0 and twice the amplitude. `amplitude` is that at half of the load.
+  amplitude · (1 + growth ((true/reach)^power − ½)), within 0 and twice the amplitude, which is that at
+  half of the load.
 
 A reported position must rise with the true one; an error so steep that it would not is taken as the steepest that does.
 """

@@ -17,8 +17,8 @@ The damping ratio ends at 0.5: beyond, a second-order low-pass has next to no pe
 - `loaded`: ω² goes with the force that is borne, ω² (1 + growth (F/at_force − 1)), and not below a fifth: cells and
   joints are stiffer or softer under load. The stiffness stands still within a step.
 - `damper`: a `share` of the damping at a swing of `at_swing` is that of a damper whose force goes with a power of the
-  speed: 2 for oil that is throttled, less than 1 for joints that rub. The ratio stated is that of equal loss in each
-  swing (Thomson, section 2.9), and the parts of a step follow each other.
+  speed: 2 for oil that is throttled, 0 for a joint that rubs, between for many of them. The ratio stated is that of
+  equal loss in each swing (Thomson, section 2.9), and the parts of a step follow each other.
 
 Exact for a force that is linear between samples, at any spacing, but for the last two.
 
@@ -194,7 +194,8 @@ def damper(dt: float, u: float, state: State, p: State) -> float:
     """Force after a mode with a damper of its own; p = (frequency, damping_ratio of the rest, strength, exponent).
 
     The damper takes speed as v' = −strength · |v|^exponent, for half of each part of the step before and after what
-    the rest of the mode does (G. Strang, SIAM J. Numer. Anal. 5, 1968, 506–517).
+    the rest of the mode does (G. Strang, SIAM J. Numer. Anal. 5, 1968, 506–517); where it would stop the mode in the
+    first half, after it, for the whole of it.
     """
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
@@ -208,9 +209,15 @@ def damper(dt: float, u: float, state: State, p: State) -> float:
     before = state[_LAST]
     for k in range(parts):
         after = before + (u - before) / (parts - k)
-        speed = _braked(0.5 * part, speed, p[2], p[3])
-        y, speed = exact(part, y, speed, before, after, omega, p[1])
-        speed = _braked(0.5 * part, speed, p[2], p[3])
+        slower = _braked(0.5 * part, speed, p[2], p[3])
+        if slower == 0.0:  # it sticks, or creeps: what pulls at it is held at once
+            _, pulled = exact(part, y, speed, before, after, omega, p[1])
+            slower = _braked(part, pulled, p[2], p[3])
+            y += 0.5 * part * (speed + slower)
+            speed = slower
+        else:
+            y, speed = exact(part, y, slower, before, after, omega, p[1])
+            speed = _braked(0.5 * part, speed, p[2], p[3])
         before = after
     state[_Y] = y
     state[_SPEED] = speed
@@ -348,7 +355,7 @@ EFFECT = Effect(
                 _FREQUENCY,
                 _DAMPING,
                 Parameter("share", "1", 0.0, 1.0, 0.7, "share of the damping that is this damper's", starts=(0.7,)),
-                Parameter("exponent", "1", 0.5, 2.0, 2.0, "power of the speed", starts=(0.5, 2.0)),
+                Parameter("exponent", "1", 0.0, 2.0, 2.0, "power of the speed", starts=(0.0, 0.6, 2.0)),
                 Parameter("at_swing", "N", 1e-6, 1e5, 0.1, "swing with the damping stated", fixed=True),
             ),
             sought=False,

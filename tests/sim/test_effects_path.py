@@ -232,6 +232,22 @@ class TestResonance:
         out = sense(active("resonance", "damper", exponent=exponent, **numbers), t, force)
         assert_allclose(out, expected, atol=1e-3)
 
+    def test_a_joint_that_rubs_sticks_where_it_is(self) -> None:
+        """Slowly up, a rest, slowly down: behind by what the joint holds, either way, and as long as it rests."""
+        frequency, zeta, swing = 40.0, 0.1, 0.3
+        w = 2 * math.pi * frequency
+        holds = math.pi / 4 * 2 * zeta * w * (w * swing) / w**2  # of the loss of a viscous damper in that swing
+        numbers = {"frequency": frequency, "damping_ratio": zeta, "share": 1.0, "exponent": 0.0, "at_swing": swing}
+        for dt in (1e-3, 7e-3):
+            t = np.arange(0.0, 9.0, dt)
+            force = np.interp(t, [0.0, 3.0, 6.0, 9.0], [0.0, 3.0, 3.0, 0.0])
+            out = sense(active("resonance", "damper", **numbers), t, force)
+            up, rests, down = (force - out)[(t > 1.0) & (t < 3.0)], out[(t > 3.01) & (t < 6.0)], (force - out)[t > 7.0]
+            # as it breaks away it swings, by its speed over ω, and nothing ends that as long as it does not turn
+            assert_allclose(up, holds, atol=1.3 / w)
+            assert np.mean(up) == pytest.approx(holds, rel=0.01) and np.mean(down) == pytest.approx(-holds, rel=0.01)
+            assert np.ptp(rests) < 0.01 * holds
+
     def test_other_shapes_are_exact_at_any_spacing(self) -> None:
         """What comes out of ramps between uneven samples does not change when more samples lie on them."""
         t = UNEVEN[:300]
