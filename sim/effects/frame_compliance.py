@@ -21,6 +21,8 @@ of K. The force used is the one at the cell, solved within the step (sim/kernel.
 - `creeping`: C ((1 − s) F + s G)/(1 − s/2), where G follows F with a time constant: parts of plastic or glue creep. C
   is the middle of at once and at last (W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear
   Viscoelastic Materials, North-Holland, 1976). Exact for a force that is linear between samples.
+- `damped`: d + τ d' = C F, all of it late: a mount of rubber or a damped column, a spring with a dashpot beside it
+  (E. I. Rivin, Passive Vibration Isolation, ASME Press, 2003, on Kelvin and Voigt's model of rubber). Exact, too.
 
 Reference: W. C. Oliver, G. M. Pharr, J. Mater. Res. 7, 1992, 1564–1583: the compliance measured is that of the
 contact plus that of the load frame.
@@ -31,6 +33,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.linear import first_order
 from sim.jit import State, block
 
 
@@ -80,6 +83,14 @@ def creeping(dt: float, force: float, state: State, p: State) -> float:
     state[0] = force - (force - state[1]) * mean + (state[0] - state[1]) * keep
     state[1] = force
     return p[0] * ((1.0 - p[1]) * force + p[1] * state[0]) / (1.0 - 0.5 * p[1])
+
+
+@block
+def damped(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection in mm; p = (compliance, time_constant); state: the late force, and the force before."""
+    state[0] = first_order(dt, state[0], state[1], force, p[1])
+    state[1] = force
+    return p[0] * state[0]
 
 
 def _compliance(what: str) -> Parameter:
@@ -176,6 +187,16 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"frame": creeping},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="damped",
+            what="all of it late, as a mount of rubber",
+            parameters=(
+                _compliance("deflection per newton in the end"),
+                Parameter("time_constant", "s", 1e-4, 10.0, 0.01, "how late it comes", starts=(0.003, 0.015)),
+            ),
+            blocks={"frame": damped},
             state=(0.0, 0.0),
         ),
     ),
