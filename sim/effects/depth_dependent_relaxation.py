@@ -2,7 +2,12 @@
 
 - `exponential`: e^(slope · δ).
 - `linear`: 1 + slope · δ, continued below 0.1 by an exponential so that no rate ever vanishes.
-- `hyperbolic`: time constants linear in depth: 1/(1 − slope · δ), continued above 10 as the others are below.
+- `hyperbolic`: time constants linear in depth, 1/(1 + g δ/reach): water that leaves by the radius of a contact under a
+  sphere goes a way whose square is as δ (Y. Z. Hu, X. Zhao, J. J. Vlassak, Z. Suo, Using indentation to characterize
+  the poroelasticity of gels, Appl. Phys. Lett. 96, 2010, 121904).
+- `layer`: time constants that go with the square of what is left of a layer, 1/(1 + g δ/reach)²: water that leaves
+  through its thickness (K. Terzaghi, Erdbaumechanik, Deuticke, 1925). In both g is such that `slope` is the mean from
+  the surface to the reach: at the surface they can be many times as steep.
 - `free_volume`: e^(slope · δ/(1 + δ/fading)): rates go with e^(−B/f), and the free volume f with depth (M. L. Williams,
   R. F. Landel, J. D. Ferry, J. Am. Chem. Soc. 77, 1955, 3701–3707).
 - `knee`: 1 + slope · min(δ, knee): linear up to a knee, and even beyond.
@@ -10,7 +15,7 @@
   reach: cells or asperities that must close first (L. J. Gibson, M. F. Ashby, Cellular Solids, 2nd ed., Cambridge
   University Press, 1997).
 
-All others have the relative slope `slope` at the surface.
+`linear`, `exponential`, `free_volume` and `knee` have the relative slope `slope` at the surface.
 
 Reference: R. A. Schapery, On the characterization of nonlinear viscoelastic materials, Polym. Eng. Sci. 9, 1969,
 295–310 (shift factor that depends on strain).
@@ -32,6 +37,14 @@ def _kept(factor: float) -> float:
     return factor if factor >= _LEAST else _LEAST * math.exp(max(factor / _LEAST - 1.0, -50.0))
 
 
+@compiled("float64(float64, float64)")
+def _at_the_reach(slope: float, reach: float) -> float:
+    """The factor there, of a mean slope; continued below a tenth by a logarithm: a fit may begin with the slope of
+    another form, which at the surface can be beyond any mean."""
+    factor = 1.0 + slope * reach
+    return factor if factor >= _LEAST else _LEAST / (1.0 + math.log(2.0 - factor / _LEAST))
+
+
 @block
 def linear(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on the rates; p = (slope,)."""
@@ -47,9 +60,17 @@ def exponential(dt: float, depth: float, state: State, p: State) -> float:
 
 @block
 def hyperbolic(dt: float, depth: float, state: State, p: State) -> float:
-    """Factor on the rates; p = (slope,)."""
-    factor = 1.0 - p[0] * max(depth, 0.0)
-    return 1.0 / _kept(factor)
+    """Factor on the rates; p = (slope, reach)."""
+    whole = _at_the_reach(p[0], p[1])
+    return 1.0 / _kept(1.0 + (1.0 / whole - 1.0) * max(depth, 0.0) / p[1])
+
+
+@block
+def layer(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on the rates; p = (slope, reach)."""
+    whole = _at_the_reach(p[0], p[1])
+    left = _kept(1.0 + (1.0 / math.sqrt(whole) - 1.0) * max(depth, 0.0) / p[1])
+    return 1.0 / (left * left)
 
 
 @block
@@ -80,11 +101,13 @@ _SLOPE = Parameter(
     -5.0,
     5.0,
     0.3,
-    "relative change of all rates per mm of depth, at the surface",
+    "relative change of all rates per mm of depth",
     required=True,
     amplitude=True,
     starts=(-0.3, 0.3),
 )
+
+_REACH = Parameter("reach", "mm", 1e-3, 1e3, 1.0, "depth to which `slope` is the mean", fixed=True)
 
 EFFECT = Effect(
     id="depth_dependent_relaxation",
@@ -98,8 +121,15 @@ EFFECT = Effect(
         Form(
             name="hyperbolic",
             what="time constants linear in depth",
-            parameters=(_SLOPE,),
+            parameters=(_SLOPE, _REACH),
             blocks={"rate": hyperbolic},
+        ),
+        Form(
+            name="layer",
+            what="time constants that go with the square of what is left of a layer",
+            parameters=(_SLOPE, _REACH),
+            sought=False,
+            blocks={"rate": layer},
         ),
         Form(
             name="free_volume",
@@ -126,7 +156,7 @@ EFFECT = Effect(
             parameters=(
                 _SLOPE,
                 Parameter("begins", "1", 0.0, 0.9, 0.4, "share of the reach up to which they are as at the surface"),
-                Parameter("reach", "mm", 1e-3, 1e3, 1.0, "depth to which `slope` is the mean", fixed=True),
+                _REACH,
             ),
             sought=False,
             blocks={"rate": beyond},

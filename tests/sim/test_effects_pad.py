@@ -307,17 +307,16 @@ class TestDamage:
 
 
 class TestRates:
-    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic", "free_volume", "knee"])
+    @pytest.mark.parametrize("form", ["linear", "exponential", "free_volume", "knee"])
     def test_relaxation_at_a_depth_runs_on_a_clock_of_its_own(self, form: str) -> None:
         slope, depth = -0.25, 1.5
-        factors = {"linear": 0.625, "exponential": math.exp(-0.375), "hyperbolic": 1 / 1.375}
-        factors["knee"] = 0.625  # at the knee
+        factors = {"linear": 0.625, "exponential": math.exp(-0.375), "knee": 0.625}  # at the knee
         factor = factors.get(form, math.exp(-0.375 / 1.375))  # with half the slope left at 4 mm
         t = np.linspace(0.0, 3.0, 301)
         force = simulate(SOFT, [active("depth_dependent_relaxation", form, slope=slope)], t, np.full(t.size, depth))
         assert_allclose(force / force[0], GEL.reduced(factor * t), rtol=1e-10)
 
-    @pytest.mark.parametrize("form", ["linear", "exponential", "hyperbolic", "free_volume", "knee"])
+    @pytest.mark.parametrize("form", ["linear", "exponential", "free_volume", "knee"])
     def test_rates_stay_above_0_and_finite(self, form: str) -> None:
         block = effect("depth_dependent_relaxation").form(form).blocks["rate"]
         for slope in (-5.0, -0.5, 0.0, 0.5, 5.0):

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sim.effects import effect
-from tests.sim.effect_tools import LINEAR, K, active, simulate
+from tests.sim.effect_tools import GEL, LINEAR, SOFT, K, active, simulate
 
 
 class TestTheSpeedThatADashpotFeels:
@@ -66,3 +66,30 @@ class TestADampedMount:
         b = (K * speed * late - late * a) / whole
         assert_allclose(force, a * t - b * np.expm1(-rate * t), atol=1e-6)
         assert math.isclose(force[-1], a * t[-1] + b, rel_tol=1e-3)
+
+
+class TestWaysThatWaterGoes:
+    @pytest.mark.parametrize(("form", "power"), [("hyperbolic", 1), ("layer", 2)])
+    @pytest.mark.parametrize("slope", [-0.3, 0.4])
+    def test_the_slope_is_the_mean_to_the_reach(self, form: str, power: int, slope: float) -> None:
+        block = effect("depth_dependent_relaxation").form(form).blocks["rate"]
+        depths = np.array([0.0, 0.6, 1.2, 2.4])
+        factors = np.array([block(0.0, float(d), [], [slope, 2.4]) for d in depths])
+        assert_allclose(factors[[0, -1]], [1.0, 1.0 + slope * 2.4], rtol=1e-12)
+        left = factors ** (-1 / power)  # of the way that water goes: straight in depth
+        assert_allclose(left, 1.0 + (left[-1] - 1.0) * depths / 2.4, rtol=1e-12)
+
+    @pytest.mark.parametrize("form", ["hyperbolic", "layer"])
+    def test_relaxation_at_a_depth_runs_on_that_clock(self, form: str) -> None:
+        t = np.linspace(0.0, 3.0, 301)
+        effects = [active("depth_dependent_relaxation", form, slope=0.25, reach=1.5)]
+        force = simulate(SOFT, effects, t, np.full(t.size, 1.5))
+        assert_allclose(force / force[0], GEL.reduced(1.375 * t), rtol=1e-10)
+
+    @pytest.mark.parametrize("form", ["hyperbolic", "layer"])
+    def test_rates_stay_above_0_and_finite(self, form: str) -> None:
+        block = effect("depth_dependent_relaxation").form(form).blocks["rate"]
+        for slope in (-5.0, -0.5, 0.0, 0.5, 5.0):
+            factors = np.array([block(0.0, float(d), [], [slope, 2.0]) for d in np.linspace(0, 10, 2001)])
+            assert np.isfinite(factors).all() and (factors > 0).all()
+            assert factors[0] == 1.0
