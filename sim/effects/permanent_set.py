@@ -10,6 +10,9 @@
 - `ratcheting`: by set · deepest · (1 + more · ln N), N how often the probe came near the deepest depth (9/10 of it)
   from half of it or less: each cycle adds less than the one before (J. L. Chaboche, Time-independent constitutive
   theories for cyclic plasticity, Int. J. Plast. 2, 1986, 149–188).
+- `flowing`: by set · deepest · (1 + flows · ln(1 + T/1 s)), T the time under load (∫ depth/deepest dt): cold flow, by
+  the logarithm of time as creep goes under a stress that stays (W. N. Findley, J. S. Lai, K. Onaran, Creep and
+  Relaxation of Nonlinear Viscoelastic Materials, North-Holland, 1976, chapter 2).
 
 `deepest` is in the probe's coordinate; the pad's depth is what is left above the sunken surface.
 
@@ -26,6 +29,7 @@ from sim.jit import State, block
 
 _DEEPEST, _SUNK, _BACK = range(3)
 _TIMES, _AWAY = 1, 2
+_LOADED = 1
 
 
 @block
@@ -90,6 +94,15 @@ def ratcheting(dt: float, y: float, state: State, p: State) -> float:
         state[_AWAY] = 0.0
         state[_TIMES] += 1.0
     return float(y - min(p[0] * state[_DEEPEST] * (1.0 + p[1] * math.log1p(state[_TIMES])), state[_DEEPEST]))
+
+
+@block
+def flowing(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the sinking surface; p = (set, flows); state: deepest, time under load."""
+    state[_DEEPEST] = max(state[_DEEPEST], y)
+    if state[_DEEPEST] > 0.0:
+        state[_LOADED] += min(max(y / state[_DEEPEST], 0.0), 1.0) * dt
+    return float(y - min(p[0] * state[_DEEPEST] * (1.0 + p[1] * math.log1p(state[_LOADED])), state[_DEEPEST]))
 
 
 _SET = Parameter(
@@ -182,6 +195,16 @@ EFFECT = Effect(
             sought=False,
             blocks={"depth": ratcheting},
             state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="flowing",
+            what="at once, and more with the logarithm of the time under load",
+            parameters=(
+                _SET,
+                Parameter("flows", "1", 0.0, 2.0, 0.1, "what each e-fold of the time adds", starts=(0.1,)),
+            ),
+            blocks={"depth": flowing},
+            state=(0.0, 0.0),
         ),
     ),
 )

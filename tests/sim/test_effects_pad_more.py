@@ -93,3 +93,21 @@ class TestWaysThatWaterGoes:
             factors = np.array([block(0.0, float(d), [], [slope, 2.0]) for d in np.linspace(0, 10, 2001)])
             assert np.isfinite(factors).all() and (factors > 0).all()
             assert factors[0] == 1.0
+
+
+class TestColdFlow:
+    def test_it_goes_with_the_logarithm_of_the_time_under_load(self) -> None:
+        """Held at 2 mm, in air for as long, and held again: the surface sinks on from where it was left."""
+        hold, air = np.full(1000, 2.0), np.full(1000, -1.0)
+        x = np.concatenate([hold, air, hold])
+        t = 0.01 * np.arange(x.size)
+        force = simulate(LINEAR, [active("permanent_set", "flowing", set=0.05, flows=0.2)], t, x)
+        loaded = np.concatenate([t[:1000], np.full(1000, t[999]), t[999] + 0.01 * np.arange(1, 1001)])
+        sunk = 0.05 * 2.0 * (1.0 + 0.2 * np.log(1.0 + loaded))
+        assert_allclose(force, np.where(x > 0.0, K * (2.0 - sunk), 0.0), rtol=1e-9)
+
+    def test_half_as_deep_it_takes_twice_the_time(self) -> None:
+        t = 0.01 * np.arange(2001)
+        x = np.where(t > 0.0, 1.0, 2.0)  # 2 mm for a moment, then half of it
+        force = simulate(LINEAR, [active("permanent_set", "flowing", set=0.05, flows=0.2)], t, x)
+        assert_allclose(force[1:], K * (1.0 - 0.1 * (1.0 + 0.2 * np.log1p(0.5 * t[1:]))), rtol=1e-9)
