@@ -14,6 +14,12 @@ The factor on F^e depends on depth δ and on the deepest depth so far; loading b
 - `hyperbola`: 1 − share · q/(1 + q) with q = (deepest − δ)/(0.6 depth): it levels off late (J. Diani, B. Fayolle, P.
   Gilormini, A review on the Mullins effect, Eur. Polym. J. 45, 2009, 601–612, on such functions). 0.6 of it makes half
   of the share go about where it has in `exponential`.
+- `weibull`: 1 − share (1 − e^(−q^n)) with q = (deepest − δ)/depth: bonds whose strengths are spread about a value
+  (W. Weibull, A statistical distribution function of wide applicability, J. Appl. Mech. 18, 1951, 293–297), so that
+  little of it goes close below the deepest point; 1 is `exponential`.
+- `conditioning`: as `exponential`, with a share that takes some cycles to be whole: share (1 − lacks · e^(−N/takes)),
+  N how often the probe has come back near the deepest depth (9/10 of it) from half of it or less (J. Diani, B. Fayolle,
+  P. Gilormini, as above, on filled rubber, most of whose softening is in the first cycles and not in the first alone).
 - `healing`: as `exponential`, with a deepest depth that is forgotten towards the depth at hand, within `time_constant`:
   rest gives back what was lost (J. A. C. Harwood, L. Mullins, A. R. Payne, Stress softening in natural rubber
   vulcanizates, J. Appl. Polym. Sci. 9, 1965, 3011–3021).
@@ -116,6 +122,28 @@ def hyperbola(dt: float, depth: float, state: State, p: State) -> float:
     state[0] = max(state[0], here, p[2])
     below = state[0] - here
     return 1.0 - p[0] * below / (below + 0.6 * p[1])
+
+
+@block
+def weibull(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (share, depth, exponent, already)."""
+    here = max(depth, 0.0)
+    state[0] = max(state[0], here, p[3])
+    return float(1.0 + p[0] * math.expm1(-(((state[0] - here) / p[1]) ** p[2])))
+
+
+@block
+def conditioning(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (share, depth, lacks, takes, already); state: deepest, times it came back, if it was away."""
+    here = max(depth, 0.0)
+    state[0] = max(state[0], here, p[4])
+    if here < 0.5 * state[0]:
+        state[2] = 1.0
+    elif state[2] != 0.0 and here > 0.9 * state[0]:
+        state[2] = 0.0
+        state[1] += 1.0
+    share = p[0] * (1.0 - p[2] * math.exp(-state[1] / p[3]))
+    return 1.0 + share * math.expm1(-(state[0] - here) / p[1])
 
 
 @block
@@ -238,6 +266,33 @@ EFFECT = Effect(
             sought=False,
             blocks={"elastic": hyperbola},
             state=(0.0,),
+        ),
+        Form(
+            name="weibull",
+            what="softer with the distance below the deepest point, hardly so close to it",
+            parameters=(
+                _SHARE,
+                _DEPTH,
+                Parameter("exponent", "1", 0.5, 4.0, 2.0, "power of the distance", starts=(2.0,)),
+                _ALREADY,
+            ),
+            sought=False,
+            blocks={"elastic": weibull},
+            state=(0.0,),
+        ),
+        Form(
+            name="conditioning",
+            what="softer below the deepest point, and more with the first cycles",
+            parameters=(
+                _SHARE,
+                _DEPTH,
+                Parameter("lacks", "1", 0.0, 0.95, 0.3, "share of it that comes with later cycles", starts=(0.3,)),
+                Parameter("takes", "1", 0.3, 30.0, 2.0, "cycles that it takes", starts=(2.0,)),
+                _ALREADY,
+            ),
+            sought=False,
+            blocks={"elastic": conditioning},
+            state=(0.0, 0.0, 0.0),
         ),
         Form(
             name="healing",

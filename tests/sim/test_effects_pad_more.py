@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sim.effects import effect
-from tests.sim.effect_tools import GEL, LINEAR, SOFT, K, active, simulate
+from tests.sim.effect_tools import GEL, LINEAR, SOFT, K, active, ramp, simulate
 
 
 class TestTheSpeedThatADashpotFeels:
@@ -111,3 +111,24 @@ class TestColdFlow:
         x = np.where(t > 0.0, 1.0, 2.0)  # 2 mm for a moment, then half of it
         force = simulate(LINEAR, [active("permanent_set", "flowing", set=0.05, flows=0.2)], t, x)
         assert_allclose(force[1:], K * (1.0 - 0.1 * (1.0 + 0.2 * np.log1p(0.5 * t[1:]))), rtol=1e-9)
+
+
+class TestSofteningFurther:
+    def test_by_the_spread_of_strengths(self) -> None:
+        x = ramp(2.0, 201)
+        numbers = {"share": 0.3, "depth": 0.4, "exponent": 2.0}
+        force = simulate(LINEAR, [active("stress_softening", "weibull", **numbers)], np.arange(x.size) * 0.01, x)
+        assert_allclose(force[:201], K * x[:201], rtol=1e-12)  # the virgin curve
+        below = 2.0 - x[201:]
+        assert_allclose(force[201:], K * x[201:] * (1.0 - 0.3 * (1.0 - np.exp(-((below / 0.4) ** 2)))), rtol=1e-9)
+
+    def test_each_cycle_adds_less(self) -> None:
+        cycle = ramp(2.0, 101)[:-1]
+        x = np.concatenate([np.tile(cycle, 4), [0.0]])
+        numbers = {"share": 0.3, "depth": 0.4, "lacks": 0.5, "takes": 1.5}
+        force = simulate(LINEAR, [active("stress_softening", "conditioning", **numbers)], np.arange(x.size) * 0.01, x)
+        for cycles in range(4):  # on the way back at 1 mm
+            at = cycles * 200 + 150
+            share = 0.3 * (1.0 - 0.5 * math.exp(-cycles / 1.5))
+            assert x[at] == pytest.approx(1.0)
+            assert_allclose(force[at], K * (1.0 - share * (1.0 - math.exp(-2.5))), rtol=1e-9)
