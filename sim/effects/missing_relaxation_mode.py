@@ -17,6 +17,9 @@ enough, the believed modes give way too, in proportion: c_0 is then 0.
 - `consolidation`: water that is pressed out of a layer, 8/π² Σ e^(−(2k+1)² rate t)/(2k+1)²: four fifths go at `rate`
   itself (K. Terzaghi, Theoretical Soil Mechanics, Wiley, 1943; M. A. Biot, J. Appl. Phys. 12, 1941, 155–164). Ten
   modes, the last of which takes what is left.
+- `gel`: water that leaves a gel under a sphere, 0.491 e^(−0.908 √s) + 0.509 e^(−1.679 s), 1/e of it left at 1/rate
+  (Y. Z. Hu, X. Zhao, J. J. Vlassak, Z. Suo, Using indentation to characterize the poroelasticity of gels, Appl. Phys.
+  Lett. 96, 2010, 121904): a stretched exponential and one mode.
 """
 
 from __future__ import annotations
@@ -35,6 +38,8 @@ if TYPE_CHECKING:
     from sim.pad import Pad
 
 NODES = 10
+_OF_A_ROOT, _ROOT, _PLAIN = 0.491, 0.908, 1.679  # Hu's fit for a sphere: share and factor of √s, factor of s
+_GEL_LASTS = 0.7507262302  # of Hu's time s: when 1/e is left
 
 
 def _with_modes(pad: Pad, shares: Sequence[float], rates: Sequence[float]) -> Pad:
@@ -117,6 +122,12 @@ def _consolidation(pad: Pad, values: Mapping[str, float]) -> Pad:
     return _with_modes(pad, shares, [float(values["rate"] * k) for k in odd**2])
 
 
+def _gel(pad: Pad, values: Mapping[str, float]) -> Pad:
+    weights, rates = _stretched_rates(0.5)
+    shares = [values["share"] * _OF_A_ROOT * w for w in weights] + [values["share"] * (1.0 - _OF_A_ROOT)]
+    return _with_modes(pad, shares, [values["rate"] * _GEL_LASTS * k for k in (*(_ROOT**2 * k for k in rates), _PLAIN)])
+
+
 _SHARE = Parameter(
     "share", "1", 0.0, 1.0, 0.1, "share of the force that relaxes in this way", required=True, amplitude=True
 )
@@ -187,6 +198,13 @@ EFFECT = Effect(
             parameters=(_SHARE, _RATE),
             sought=False,
             amend=_consolidation,
+        ),
+        Form(
+            name="gel",
+            what="water that leaves a gel under a sphere (Hu)",
+            parameters=(_SHARE, _RATE),
+            sought=False,
+            amend=_gel,
         ),
     ),
 )

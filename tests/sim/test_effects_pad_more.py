@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import brentq
 
 from sim.effects import effect
 from tests.sim.effect_tools import GEL, LINEAR, SOFT, K, active, ramp, simulate
@@ -132,3 +133,20 @@ class TestSofteningFurther:
             share = 0.3 * (1.0 - 0.5 * math.exp(-cycles / 1.5))
             assert x[at] == pytest.approx(1.0)
             assert_allclose(force[at], K * (1.0 - share * (1.0 - math.exp(-2.5))), rtol=1e-9)
+
+
+class TestAGel:
+    def test_water_leaves_it_as_under_a_sphere(self) -> None:
+        """Hu, Zhao, Vlassak and Suo's curve, of which 1/e is left at 1/rate."""
+        t = np.concatenate([[0.0], np.geomspace(1e-3, 3.0, 300)])
+        effects = [active("missing_relaxation_mode", "gel", share=0.5, rate=2.0)]
+        left = 2.0 * simulate(LINEAR, effects, t, np.full(t.size, 1.0)) / K - 1.0
+        lasts = brentq(lambda s: gel_left(s) - math.exp(-1.0), 0.01, 10.0)
+        seen = t > 0.005
+        assert_allclose(left[seen], gel_left(2.0 * lasts * t[seen]), atol=0.01)
+        assert np.interp(0.5, t, left) == pytest.approx(math.exp(-1.0), abs=2e-3)
+
+
+def gel_left(time):
+    """Share of the water's force that is left at Hu's time."""
+    return 0.491 * np.exp(-0.908 * np.sqrt(time)) + 0.509 * np.exp(-1.679 * time)
