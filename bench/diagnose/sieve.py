@@ -93,7 +93,7 @@ class Sieve:
             for pair, found in zip(wanted, pool.map(lambda p: starts(signatures, *p), wanted), strict=True):
                 by_id.setdefault(pair[0].id, []).extend(found)
             promising = self._promising(by_id, least) if only is None else list(by_id)
-            for id_, start in self._hidden(signatures, wanted, promising):
+            for id_, start in self._hidden(signatures, wanted):
                 by_id[id_].append(start)
                 promising += [] if id_ in promising else [id_]
             self.progress(f"{len(promising)} candidates")
@@ -184,13 +184,11 @@ class Sieve:
         order = sorted((i for i in promise if promise[i] >= least), key=lambda i: -promise[i])
         return order[:WORTH]
 
-    def _hidden(
-        self, at: Signatures, pairs: Sequence[tuple[Effect, Form]], promising: Sequence[str]
-    ) -> list[tuple[str, Start]]:
-        """Causes whose place a mode of the pad has taken, among those whose signature shows nothing; and a mode whose
-        place others have taken."""
+    def _hidden(self, at: Signatures, pairs: Sequence[tuple[Effect, Form]]) -> list[tuple[str, Start]]:
+        """Causes whose place a mode of the pad has taken, whose signature shows next to nothing; and a mode whose place
+        others have taken."""
         rates, believed = self.believed.pad.pad.relaxation.rates, self.believed.pad.x()
-        causes = [instead_of_a_mode(at.fit, rates, cause_of(*pair)) for pair in pairs if pair[0].id not in promising]
+        causes = [instead_of_a_mode(at.fit, rates, cause_of(*pair)) for pair in pairs]
         out = [(cause.id, Start(cause, np.inf, believed)) for cause in causes if cause is not None]
         more = [one_more_mode(at, rates, cause_of(*pair)) for pair in pairs]
         return [*out, *((cause.id, Start(cause, np.inf, pad)) for cause, pad in (m for m in more if m is not None))]

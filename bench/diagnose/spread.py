@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from bench.identify.uncertainty import sandwich
 
 from .data import Data
-from .refit import Fit, errors, jacobian
+from .refit import Fit, chi2, errors, jacobian
 from .shapes import families, scores, stand_in
 
 Array = NDArray[np.float64]
 
 UNKNOWN = 1.0  # variance of a logarithm with which nothing in the data moves
+STEPS = np.geomspace(1e-4, 1.0, 25)  # of a number about which χ² is flat
 WIDEST = 1e6  # times the variance that the stand-in tells
 
 
@@ -26,7 +27,36 @@ def covariance(data: Data, short: Data, fit: Fit) -> Array:
     if not len(fit.x):
         return np.zeros((0, 0))
     own = of_the_noise(data, fit)
+    for position in _flat(fit, np.diag(own)):
+        own[position, position] = _by_steps(data, fit, position)
     return own + np.diag(_of_the_shapes(short, fit, np.diag(own).copy()))
+
+
+def _flat(fit: Fit, own: Array) -> list[int]:
+    """Places in x of the contract's numbers within their bounds that no small step changes the force by."""
+    asked = {
+        position
+        for index, cause in enumerate(fit.structure.causes)
+        for position, p in zip(range(*fit.structure.of_cause(index).indices(len(fit.x))), cause.fitted, strict=True)
+        if p.required and own[position] <= 0.0  # below: of a matrix that has no inverse
+    }
+    coordinates = fit.structure.coordinates
+    return [k for k in sorted(asked) if coordinates[k].lower < fit.x[k] < coordinates[k].upper]
+
+
+def _by_steps(data: Data, fit: Fit, position: int) -> float:
+    """Variance of a number about which χ² only jumps, as that of the depth at which a bond snaps between two samples:
+    the square of the step by which χ² rises by 1 on either side; 0 where none does."""
+    least, coordinate = chi2(data, fit.structure, fit.x), fit.structure.coordinates[position]
+    for step in STEPS:
+        beside = []
+        for way in (-step, step):
+            x = fit.x.copy()
+            x[position] = np.clip(x[position] + way, coordinate.lower, coordinate.upper)
+            beside.append(chi2(data, fit.structure, x))
+        if min(beside) > least + 1.0:
+            return float(step**2)
+    return 0.0
 
 
 def of_the_noise(data: Data, fit: Fit) -> Array:

@@ -134,3 +134,20 @@ def test_a_number_of_which_the_stand_in_says_nothing_widens_none(monkeypatch):
         monkeypatch.setattr(spread, "scores", lambda short, members: np.zeros(2))
         added = spread._of_the_shapes(None, fit, np.array([np.float64(1e250)]))
         assert np.isfinite(added).all() and added[0] >= 0.5 * 0.5**2
+
+
+def test_a_number_about_which_the_cost_only_jumps_has_a_standard_error(monkeypatch):
+    """A bond that snaps between two samples: no small step changes the force, and a singular sandwich tells nothing."""
+    pull = SimpleNamespace(name="range", required=True)
+    structure = SimpleNamespace(
+        of_cause=lambda place: slice(0, 1),
+        causes=[SimpleNamespace(fitted=[pull])],
+        coordinates=[Coordinate("range", -9, 1)],
+    )
+    fit = SimpleNamespace(structure=structure, x=np.array([-3.0]))
+    monkeypatch.setattr(spread, "chi2", lambda data, structure, x: 100.0 + 40.0 * (not -3.05 <= x[0] <= -2.98))
+    assert spread._flat(fit, np.array([-16.0])) == spread._flat(fit, np.array([0.0])) == [0]
+    assert spread._flat(fit, np.array([1e-4])) == []
+    assert 0.05 <= np.sqrt(spread._by_steps(None, fit, 0)) < 0.08  # on both sides
+    monkeypatch.setattr(spread, "chi2", lambda data, structure, x: 100.0)
+    assert spread._by_steps(None, fit, 0) == 0.0
