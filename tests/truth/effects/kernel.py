@@ -31,9 +31,10 @@ class Numbers(NamedTuple):
     stick_once: bool = False
     stick_keeps: float = 1.0  # share of that tension that is left each time it has let go
     stick_Ns: float = 0.0  # impulse of tension that a film bears
+    stick_s: float = 0.0  # contact after which all of the tension is borne, by the root of time; 0 at once
     offset_mm: float = 0.0  # surface below the zero of position
     # 1 linear, 2 stiffening, 3 softer beyond a preload, 4 Hertz, 5 creeps, 6 slips, 7 root, 8 cubic,
-    # 9 with the way
+    # 9 with the way, 10 bowed rod, 11 wedge
     frame_form: int = 0
     frame_mm_N: float = 0.0
     frame_force_N: float = 1.0
@@ -65,14 +66,14 @@ class Numbers(NamedTuple):
     set_mm_mm: float = 0.0
     set_limit_mm: float = 1.0
     # 1 exponential, 2 snaps off, 3 neck, 4 bridge, 5 van der Waals, 6 bilinear, 7 fibrils, 8 by rate, 9 smooth,
-    # 10 tack, 11 by depth, 12 strands
+    # 10 tack, 11 by depth, 12 strands, 13 Dugdale, 14 suction
     adhesion_form: int = 0
     pull_off_N: float = 0.0
     adhesion_mm: float = 1.0
     adhesion_s: float = 1.0
     adhesion_depth_mm: float = 1.0
     # 1 linear, 2 with depth, 3 thinning, 4 thickening, 5 Eyring, 6 one-sided, 7 √depth, 8 load, 9 squeeze, 10 flow,
-    # 11 stiffness
+    # 11 stiffness, 12 Carreau, 13 blow-off
     damping_form: int = 0
     damping_Ns_mm: float = 0.0
     damping_ref: float = 1.0
@@ -203,6 +204,11 @@ def _damped(p, table, speed, depth):
         return p.damping_Ns_mm * speed * (1 + abs(speed) / p.damping_ref)
     if p.damping_form == 11:
         return p.damping_Ns_mm * speed * _slope(table, depth, p.table_mm) / p.damping_ref
+    if p.damping_form == 12:  # n = 0.4
+        return p.damping_Ns_mm * speed * (1 + (speed / p.damping_ref) ** 2) ** -0.3
+    if p.damping_form == 13:
+        slow = min(max(speed, -p.damping_ref), p.damping_ref)
+        return p.damping_Ns_mm * (slow + 0.25 * (speed - slow))
     exponent = 0.7 if p.damping_form == 3 else 1.3
     return math.copysign(p.damping_Ns_mm * p.damping_ref * (abs(speed) / p.damping_ref) ** exponent, speed)
 
@@ -264,6 +270,14 @@ def _deflection(p, force, place, late, new):
         return p.frame_mm_N * p.frame_force_N * y
     if p.frame_form == 9:
         return p.frame_mm_N * (1 + p.frame_per_mm * (place - p.frame_at_mm)) * force
+    if p.frame_form == 10:  # up to nine tenths of the load at which it buckles
+        left = max(1 - force / p.frame_force_N, 0.1)
+        bent = 0.5 * p.frame_force_N * (1 / (left * left) - 1)
+        return p.frame_mm_N * ((1 - p.frame_late_share) * force + p.frame_late_share * bent)
+    if p.frame_form == 11:
+        low, high = force / (1 + p.frame_late_share), force / (1 - p.frame_late_share)
+        new[0] = min(max(late[0], min(low, high)), max(low, high))
+        return p.frame_mm_N * new[0]
     return p.frame_mm_N * force
 
 
@@ -318,6 +332,8 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
     new[_S] = inner
     bears = was and not (p.stick_once and state[_BROKEN] > 0)
     tension = p.stick_N * p.stick_keeps ** state[_BROKEN]
+    if p.stick_s > 0:
+        tension *= math.sqrt(min(state[_CONTACT] * p.step_s / p.stick_s, 1.0))
     new[_PULLED] = state[_PULLED] + p.step_s * max(-force, 0.0) if bears and force < 0 else 0.0
     touching = (not p.unilateral) or force >= (-tension if bears else -1e-13) or 0 < new[_PULLED] < p.stick_Ns
     new[_BROKEN] = state[_BROKEN] + (1.0 if was and not touching else 0.0)
@@ -360,6 +376,10 @@ def _pad(p, table, x, height, gain, e, k, c, z, state, new_z, new):
         elif new[_ATTACHED] > 0 and p.adhesion_form == 12:
             share = gap / p.adhesion_mm  # four alike, which break at 0.4, 0.6, 0.8 and 1
             force -= p.pull_off_N * share / 1.8 * min(4.0, math.ceil(5 * (1 - share)))
+        elif p.adhesion_form == 13:
+            force -= p.pull_off_N if gap < p.adhesion_mm else 0.0
+        elif new[_ATTACHED] > 0 and p.adhesion_form == 14:  # Boyle: 1 − V_0/V, V_0 of 0.3 of the range
+            force -= p.pull_off_N * 1.3 * gap / (gap + 0.3 * p.adhesion_mm)
         elif new[_ATTACHED] > 0 and p.adhesion_form == 6:
             force -= p.pull_off_N * min(4 * gap, (p.adhesion_mm - gap) * 4 / 3) / p.adhesion_mm
         elif new[_ATTACHED] > 0 and p.adhesion_form == 4:
