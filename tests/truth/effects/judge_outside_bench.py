@@ -51,19 +51,16 @@ def shunt_marks(build: Build, shape: str, size: float) -> dict[str, float]:
     `one_way`: the reading is higher by a step, at any force. `both_ways`: higher, then lower for as long.
     """
     rng = build.rng
-    step, every, lasts = (
-        0.06 * size * build.force_N * spread(rng, 0.8, 1.25),
-        spread(rng, 2.0, 5.0),
-        rng.uniform(0.25, 0.5),
-    )
-    phase, both = float(rng.uniform(0.2, 0.9)), shape == "both_ways"
+    both = shape == "both_ways"
+    step = (0.03 if both else 0.045) * size * build.force_N * spread(rng, 0.8, 1.25)
+    every, lasts, phase = spread(rng, 2.0, 5.0), float(rng.uniform(0.25, 0.5)), float(rng.uniform(0.2, 0.9))
 
     def added(t):
         since = (t / every + phase) % 1 * every
         return step * ((since < lasts) * 1.0 - both * ((since >= lasts) & (since < 2 * lasts)))
 
     _disturb(build, added)
-    return {"step": step, "every": every, "lasts": float(lasts)}
+    return {"step": step, "every": every, "lasts": lasts}
 
 
 @judge_effect("touch_heat", "one_body", "two_bodies")
@@ -73,7 +70,7 @@ def touch_heat(build: Build, shape: str, size: float) -> dict[str, float]:
     `one_body`: within 1.5 to 5 s. `two_bodies`: half of it within a fifth of that.
     """
     rng, motion = build.rng, build.plant.motion
-    zero = 0.07 * size * build.force_N * spread(rng, 0.8, 1.25) * float(rng.choice([-1.0, 1.0]))
+    zero = 0.045 * size * build.force_N * spread(rng, 0.8, 1.25) * float(rng.choice([-1.0, 1.0]))
     tau, grid = spread(rng, 1.5, 5.0), np.arange(0.0, build.plant.duration_s + 1.0, 1e-3)
     touches = (motion.position(grid) > 0).astype(float)
     warm = _fades(touches, 1e-3, tau)

@@ -39,10 +39,8 @@ def staircase(build: Build, shape: str, size: float) -> dict[str, float]:
     within 6 to 15 s.
     """
     rng, strong = build.rng, shape == "strengthens"
-    more, step = (
-        0.17 * size * spread(rng, 0.8, 1.25),
-        float(rng.uniform(0.3, 0.5) if strong else rng.uniform(0.2, 0.35)),
-    )
+    more, share = 0.25 * size * spread(rng, 0.8, 1.25), (0.3, 0.5) if strong else (0.2, 0.35)
+    step = float(rng.uniform(*share))
     fades_s, enough = (spread(rng, 2.0, 6.0), 0.0) if strong else (spread(rng, 6.0, 15.0), 0.5 * build.depth_mm)
     side = 1.0 if strong else -1.0
     build.plant.gain.append(
@@ -106,7 +104,7 @@ def front(build: Build, shape: str, size: float) -> dict[str, float]:
     `thaws`: softer, 1 − a min(front/δ, 1).
     """
     rng, depth, duration = build.rng, build.depth_mm, build.plant.duration_s
-    more, whole = 0.3 * size * spread(rng, 0.8, 1.25), depth * float(rng.uniform(0.5, 1.0))
+    more, whole = 0.4 * size * spread(rng, 0.8, 1.25), depth * float(rng.uniform(0.5, 1.0))
     side = 1.0 if shape == "hardens" else -1.0
 
     def gain(t, x):

@@ -31,7 +31,7 @@ from .third_outside_bench import _fades
 
 @judge_shapes("separation", "heals")
 def separation(build: Build, shape: str, size: float) -> dict[str, float]:
-    """The lab believes `bonded`. It bears 2 % of the greatest force after a contact of 1 to 4 s, by the root of time."""
+    """The lab believes `bonded`. It bears 2 % of the greatest force after 1 to 4 s of contact, by its root."""
     build.believed = replace(build.believed, contact="bonded")
     stick = 0.02 * min(size, 2.0) * build.force_N
     build.plant.numbers.update(stick_N=stick, stick_s=spread(build.rng, 1.0, 4.0))
