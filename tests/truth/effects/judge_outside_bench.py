@@ -90,6 +90,7 @@ def coarse_codes(build: Build, shape: str, size: float) -> dict[str, float]:
     rng, child = build.rng, _child(build.rng)
     width, full = 0.06 * size * spread(rng, 0.8, 1.25), 1.2 * build.force_N
     widths = child.uniform(0.3, 1.7, int(np.ceil(8 / max(width, 1e-3))))
+    widths[0] = 1.0
     edges = full * width * (np.cumsum(widths) - 0.5)
     middles = np.concatenate([[0.0], (edges[1:] + edges[:-1]) / 2])
 

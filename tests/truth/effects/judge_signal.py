@@ -109,7 +109,7 @@ def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
     delay = 2e-3 * size * spread(rng, 0.6, 1.6)
     cycles, phases = delay * rng.uniform([0.6, 0.4], [0.9, 0.6]), rng.uniform(0, 1, 2)
     more, tau = float(rng.uniform(0.5, 1.0)), spread(rng, 0.1, 0.4)
-    grid = np.arange(0.0, build.plant.duration_s + 1.0, 1e-3)
+    grid = np.arange(0.0, build.plant.duration_s, 1e-3)
     rests = 1 + more * (1 - _fades((np.abs(motion.velocity(grid)) > 1e-6).astype(float), 1e-3, tau))
     rests /= np.mean(rests)
 
