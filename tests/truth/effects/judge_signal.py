@@ -59,7 +59,7 @@ def resonance(build: Build, shape: str, size: float) -> dict[str, float]:
         delay, kept = float(np.hypot(lost, np.pi) / (2 * omega)), float(np.exp(-lost))
         build.sensor(_RESONANCE, lambda t, force: echoes(t, force, delay, kept))
         return {"frequency": frequency, "damping_ratio": damping}
-    num, den, apart, damping = fractional(power, damping)
+    num, den, apart, damping = fractional(power, 1.6 * damping)
     build.sensor(_RESONANCE, lambda t, force: ramp_filter(t * omega / apart, force, num.tolist(), den.tolist()))
     return {"frequency": frequency, "damping_ratio": damping}
 
