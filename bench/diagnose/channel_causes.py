@@ -101,14 +101,12 @@ def hum_cause(line: Line) -> Cause:
         return cause_of(hum, hum.form("dimmed"), values | {"fires": line.fires_rad})
     if line.higher:
         found = {3: (line.ratio, line.third_phase_rad)} | {order: (ratio, angle) for order, ratio, angle in line.higher}
-        if any(order % 2 == 0 for order in found):
-            words, form = {2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth", 7: "seventh"}, "distorted"
-        else:
-            words, form = {3: "ratio", 5: "fifth", 7: "seventh"}, "flat_topped"
-        own = {word: found.get(order, (0.0, 0.0))[0] for order, word in words.items()}
-        angles = {"ratio": "third_phase"}
-        own |= {angles.get(word, f"{word}_phase"): found.get(order, (0.0, 0.0))[1] for order, word in words.items()}
-        return cause_of(hum, hum.form(form), values | own)
+        form = hum.form("distorted" if any(order % 2 == 0 for order in found) else "flat_topped")
+        # behind amplitude, frequency and phase stand pairs of share and phase, in the order of the harmonics
+        shares = [p.name for p in form.parameters[len(values) :]]
+        orders = range(2, 8) if form.name == "distorted" else (3, 5, 7)
+        pairs = (part for order in orders for part in found.get(order, (0.0, 0.0)))
+        return cause_of(hum, form, values | dict(zip(shares, pairs, strict=True)))
     if third:
         return cause_of(hum, hum.form("harmonics"), values | third)
     return cause_of(hum, hum.form("sine"), values)

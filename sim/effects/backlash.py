@@ -29,6 +29,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.stamps import AT_TIME
 from sim.effects.waves import phase
 from sim.jit import State, block
 
@@ -192,7 +193,7 @@ EFFECT = Effect(
             parameters=(
                 _GAP,
                 Parameter("growth", "1/s", -0.2, 0.2, 0.0, "relative growth in time", starts=(-0.01, 0.01)),
-                Parameter("at_time", "s", 0.0, 1e6, 30.0, "time since the first sample when it holds", fixed=True),
+                AT_TIME,
             ),
             sought=False,
             blocks={"play": wearing},

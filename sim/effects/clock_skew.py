@@ -23,29 +23,26 @@ from collections.abc import Mapping
 import numpy as np
 
 from sim.effects.base import Array, Effect, Form, Parameter
-
-
-def _origin(stamp_s: Array) -> float:
-    return float(stamp_s.flat[0]) if stamp_s.ndim and stamp_s.size else 0.0
+from sim.effects.stamps import AT_TIME, origin
 
 
 def skewed(values: Mapping[str, float], stamp_s: Array) -> Array:
     """When forces stamped `stamp_s` were felt, s."""
-    origin = _origin(stamp_s)
-    return np.asarray(origin - values.get("offset", 0.0) + (stamp_s - origin) / (1.0 + 1e-6 * values["skew"]))
+    begins = origin(stamp_s)
+    return np.asarray(begins - values.get("offset", 0.0) + (stamp_s - begins) / (1.0 + 1e-6 * values["skew"]))
 
 
 def ageing(values: Mapping[str, float], stamp_s: Array) -> Array:
     """When forces stamped `stamp_s` were felt, s."""
-    origin = _origin(stamp_s)
-    since = stamp_s - origin
+    begins = origin(stamp_s)
+    since = stamp_s - begins
     gained = 1e-6 * values["skew"] * since * (1.0 + values["growth"] * (0.5 * since - values["at_time"]))
     return np.asarray(stamp_s - gained)
 
 
 def held(values: Mapping[str, float], stamp_s: Array) -> Array:
     """When forces stamped `stamp_s` were felt, s."""
-    since, span = stamp_s - _origin(stamp_s), 2.0 * values["at_time"]
+    since, span = stamp_s - origin(stamp_s), 2.0 * values["at_time"]
     free = np.maximum(since - values["free_from"] * span, 0.0) / (1.0 - values["free_from"])
     return np.asarray(stamp_s - 1e-6 * values["skew"] * free)
 
@@ -86,7 +83,7 @@ EFFECT = Effect(
             parameters=(
                 _SKEW,
                 Parameter("growth", "1/s", -1.0, 1.0, 0.0, "relative growth of the skew", starts=(-0.02, 0.02)),
-                Parameter("at_time", "s", 0.0, 1e6, 30.0, "time since the first sample when it holds", fixed=True),
+                AT_TIME,
             ),
             time_shift=ageing,
             sought=False,

@@ -24,6 +24,7 @@ import math
 from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.stamps import AT_TIME
 from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC, phase
 from sim.jit import State, block
 
@@ -199,7 +200,7 @@ EFFECT = Effect(
                 _PERIOD,
                 PHASE,
                 Parameter("growth", "1/s", -0.2, 0.2, 0.0, "relative growth in time", starts=(-0.005, 0.005)),
-                Parameter("at_time", "s", 0.0, 1e6, 30.0, "time since the first sample when it holds", fixed=True),
+                AT_TIME,
             ),
             sought=False,
             blocks={"probe": warming},

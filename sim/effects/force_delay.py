@@ -18,6 +18,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from sim.effects.base import Array, Effect, Form, Parameter
+from sim.effects.stamps import origin
 
 
 def late(values: Mapping[str, float], stamp_s: Array) -> Array:
@@ -27,7 +28,7 @@ def late(values: Mapping[str, float], stamp_s: Array) -> Array:
 
 def wandering(values: Mapping[str, float], stamp_s: Array) -> Array:
     """When forces stamped `stamp_s` were felt, s."""
-    since = stamp_s - (float(stamp_s.flat[0]) if stamp_s.ndim and stamp_s.size else 0.0)
+    since = stamp_s - origin(stamp_s)
     angle = 0.5 * math.pi * since / max(values["at_time"], 1e-9)
     more = sum(values[f"wave_{k}"] * np.cos(k * angle) for k in WAVES)
     return np.asarray(stamp_s - values["delay"] * np.maximum(1.0 + more, 0.0))

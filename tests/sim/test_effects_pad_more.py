@@ -45,12 +45,13 @@ class TestTheSpeedThatADashpotFeels:
 
 class TestADampedMount:
     def test_a_step_of_force_comes_late(self) -> None:
-        block = effect("frame_compliance").form("damped").blocks["frame"]
+        damped = effect("frame_compliance").form("damped")
         state, compliance, late = [0.0, 0.0], 0.01, 0.02
-        block(0.0, 5.0, state, [compliance, late])
+        block, numbers = damped.blocks["frame"], damped.vector({"compliance": compliance, "time_constant": late})
+        block(0.0, 5.0, state, numbers)
         state[1] = 5.0  # the force stands from here on
         times = np.cumsum(np.random.default_rng(2).uniform(1e-4, 5e-3, 50))
-        got = [block(float(d), 5.0, state, [compliance, late]) for d in np.diff(times, prepend=0.0)]
+        got = [block(float(d), 5.0, state, numbers) for d in np.diff(times, prepend=0.0)]
         assert_allclose(got, compliance * 5.0 * -np.expm1(-times / late), rtol=1e-12)
 
     def test_under_a_ramp_it_is_a_spring_and_a_dashpot_in_series_with_the_pad(self) -> None:
