@@ -9,6 +9,7 @@ samples, a trapezoid's pieces are met exactly, and corners keep their place.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ REACHES = np.array([2, 3, 4, 6, 8, 11, 15, 21, 29, 40, 56, 80, 112, 160], dtype=
 """Half-widths of the windows, in samples."""
 SHORTEST, EDGE = 30, 4  # samples of a hold that can show it to be at rest; samples at its ends that may still move
 LIKELY, CHANCE = 4.0, 5.0  # standard deviations: levels nearer are one, samples farther off are no noise
+FEWEST = 10  # samples of a level within a hold
 BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
 TOGETHER = 20  # samples that share the error of a window, about
 WIDTH = 2.2  # standard deviations on either side of a value
@@ -174,22 +176,45 @@ def _rested(
     hop = resolution(position_mm) if coarse else 0.0
     noise_mm = max(noise_mm, 0.5 * hop)
     quiet_mm = max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)), 0.6 * hop)
-    for number, (a, b) in enumerate(_rests(position_mm, clean_mm, noise_mm, quiet_mm), 1):
+    numbered = 0
+    for a, b in _rests(position_mm, clean_mm, noise_mm, quiet_mm):
         inside = position_mm[a + EDGE : b + 1 - EDGE]
         n = len(inside)
         if n < SHORTEST:
             continue
         level = float(inside.mean())
         halves = abs(float(inside[: n // 2].mean() - inside[n // 2 :].mean())) / (2.0 * noise_mm / np.sqrt(n))
-        if float(np.sum((inside - level) ** 2)) <= noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n)) and halves < LIKELY:
+        cuts = [] if coarse else _steps((inside - level) / noise_mm)
+        if float(np.sum((inside - level) ** 2)) <= noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n)) and (cuts or halves < LIKELY):
             ahead, behind = position_mm[b + 1 : b + 1 + SHORTEST], position_mm[max(a - SHORTEST, 0) : a][::-1]
-            a, b = a - _staying((behind - level) / noise_mm), b + _staying((ahead - level) / noise_mm)
-            clean[a : b + 1] = level
-            std[a : b + 1] = noise_mm / np.sqrt(n)
-            # a coarse scale is off by as much whenever the same level is held
-            again = reached.setdefault(float(np.median(inside)), number) if coarse else number
-            hold[a : b + 1] = again
+            edges = [a, *(a + EDGE + cut for cut in cuts), b + 1]
+            levels = [float(inside[i:j].mean()) for i, j in pairwise([0, *cuts, n])]
+            edges[0] -= _staying((behind - levels[0]) / noise_mm)
+            edges[-1] += _staying((ahead - levels[-1]) / noise_mm)
+            for (first, end), value in zip(pairwise(edges), levels, strict=True):
+                numbered += 1
+                clean[first:end], std[first:end] = value, noise_mm / np.sqrt(end - first)
+                # a coarse scale is off by as much whenever the same level is held
+                hold[first:end] = reached.setdefault(float(np.median(inside)), numbered) if coarse else numbered
     return clean, std, hold
+
+
+def _steps(off: Array) -> list[int]:
+    """Where a level held changes, as samples that begin another; `off`: from its mean, in standard deviations.
+
+    A servo's integral and a pad that relaxes let a mover creep by less than a step of its scale, which many readings
+    tell and friction answers to. Cut in two where the means on either side differ most, and again: binary segmentation
+    (A. J. Scott, M. Knott, Biometrics 30, 1974, 507–512).
+    """
+    n = len(off)
+    if n < 2 * FEWEST:
+        return []
+    before = np.arange(1, n)
+    differs = np.abs(np.cumsum(off)[:-1] - before * off.mean()) / np.sqrt(before * (n - before) / n)
+    at = FEWEST + int(np.argmax(differs[FEWEST - 1 : n - FEWEST]))
+    if differs[at - 1] < CHANCE:
+        return []
+    return [*_steps(off[:at]), at, *(at + cut for cut in _steps(off[at:]))]
 
 
 def _staying(off: Array) -> int:

@@ -116,7 +116,7 @@ class Sieve:
             third = _worth(fit, wide, THIRD)
             self.progress(f"closer: {', '.join(trials[0].id for trials in wide[:third])}")
             close = [_contenders(fit, trials) for trials in wide[:third]]
-            ended = list(pool.map(lambda trials: [self._carried(t, ALL) for t in trials], close))
+            ended = list(pool.map(lambda trials: [self._ended(t) for t in trials], close))
             best = min((t for trials in ended for t in trials), key=lambda t: t.score, default=None)
             if best is not None:
                 again = pool.map(lambda trials: self._relaxing_as(best, min(trials, key=lambda t: t.score)), ended)
@@ -316,6 +316,12 @@ class Sieve:
 
     def _penalty(self, fit: Fit) -> float:
         return penalty(fit.free, self.effective) * self.prepared.memory
+
+    def _ended(self, trial: Trial) -> Trial:
+        """At its minimum: on again where it is still on its way, and something is left to explain."""
+        done = self._carried(trial, ALL)
+        left = unexplained(done.fit.chi2, self.expected) > 0.0
+        return self._carried(done, ALL) if left and not done.fit.converged else done
 
     def _carried(self, trial: Trial, steps: int) -> Trial:
         return self._trial(refit(self.short, trial.fit.structure, trial.fit.x, steps, 1e-8))

@@ -36,6 +36,20 @@ def test_a_rest_has_one_level_whatever_its_noise(seed: int) -> None:
     assert np.abs(off[np.gradient(x) == 0.0]).max() < 0.3 * NOISE_MM
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_creep_within_a_rest_is_followed_though_it_is_less_than_the_noise(seed: int) -> None:
+    """Friction in its presliding answers to it: a tenth of a micrometre can be a tenth of what there is."""
+    t = np.arange(0.0, 66.0, STEP_S)
+    x = staircase(t)
+    since = np.mod(t - 6.0, 12.0)
+    creep_mm = np.where((t > 6.2) & (since < 0.6), 0.7 * NOISE_MM, 0.0)
+    told = felt(t, x + creep_mm + NOISE_MM * np.random.default_rng(seed).standard_normal(t.size))
+    followed = np.interp(t, told.time_s, told.position_mm) - x
+    for k in range(5):
+        early, late = (t > 6.15 + 12.0 * k) & (t < 6.55 + 12.0 * k), (t > 7.0 + 12.0 * k) & (t < 17.5 + 12.0 * k)
+        assert abs(followed[early].mean() - followed[late].mean() - 0.7 * NOISE_MM) < 0.3 * NOISE_MM
+
+
 def test_a_short_step_out_of_a_rest_is_motion() -> None:
     t = np.arange(0.0, 66.0, STEP_S)
     x = staircase(t)
