@@ -30,7 +30,7 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
     at = prepared.at
     counted = m.counted()[prepared.kept]
     error = (prepared.raw.force_N - before_N)[at]
-    n = max(len(at), 1)
+    n = max(int(counted.sum()), 1)
     out = []
     if prepared.mains is not None:
         hum = prepared.hum_N[at][counted]

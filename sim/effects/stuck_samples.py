@@ -2,8 +2,9 @@
 
 When is drawn by a hash of the sample's number and `seed` (no fit can find it; detectors flag the samples instead).
 
-- `runs`: each time for `length` samples.
-- `random_runs`: for a random number of samples, geometrically distributed with that mean.
+- `runs`: each time for `length` samples, once in every `length`/`fraction` of them, anywhere within, so that a short
+  recording has its share too.
+- `random_runs`: at any time, and for a random number of samples, geometrically distributed with that mean.
 
 Reference: R. Isermann, Fault-Diagnosis Systems, Springer, 2006 (sensor faults).
 """
@@ -16,23 +17,21 @@ from sim.effects.base import Effect, Form, Parameter
 from sim.effects.draws import uniform
 from sim.jit import State, block
 
-_COUNT, _LEFT, _HELD = range(3)
+_COUNT, _HELD, _LEFT = range(3)
 
 
 @block
 def runs(dt: float, force: float, state: State, p: State) -> float:
-    """p = (fraction, length, seed); state: samples so far, samples left of the run, value held."""
-    n = 2 * int(state[_COUNT])
+    """p = (fraction, length, seed); state: samples so far, value held."""
+    n = state[_COUNT]
     state[_COUNT] += 1.0
-    if n > 0 and state[_LEFT] < 1.0 and p[0] > 0.0:
+    if n > 0.0 and p[0] > 0.0:
         length = math.floor(p[1] + 0.5)
-        # runs of `length` and gaps of mean 1/begin − 1 make up the fraction
-        begin = p[0] / (p[0] + length * (1.0 - p[0]))
-        if uniform(n, int(p[2])) < begin:
-            state[_LEFT] = length
-    if state[_LEFT] >= 1.0:
-        state[_LEFT] -= 1.0
-        return state[_HELD]
+        every = length / min(p[0], 1.0)
+        turn = math.floor(n / every)
+        begins = math.ceil(turn * every + uniform(int(turn), int(p[2])) * (every - length))
+        if begins <= n < begins + length:
+            return state[_HELD]
     state[_HELD] = force
     return force
 
@@ -72,7 +71,7 @@ EFFECT = Effect(
             what="in runs of one length",
             parameters=(_FRACTION, _LENGTH, _SEED),
             blocks={"sampling": runs},
-            state=(0.0,) * 3,
+            state=(0.0,) * 2,
         ),
         Form(
             name="random_runs",

@@ -365,6 +365,12 @@ class TestLimitsAndFaults:
         if form in ("heavy", "spikes"):
             assert abs((off[hit] > 0).mean() - 0.5) < 2.5 / math.sqrt(hit.sum())
 
+    @pytest.mark.parametrize("seed", range(5))
+    def test_a_short_recording_has_its_share_of_stuck_samples(self, seed: int) -> None:
+        force = np.arange(2500.0)
+        stuck = sample(active("stuck_samples", "runs", fraction=0.02, length=10.0, seed=float(seed)), force) != force
+        assert abs(stuck.sum() - 50) <= 10
+
     @pytest.mark.parametrize("form", ["runs", "random_runs"])
     def test_stuck_samples(self, form: str) -> None:
         n, fraction, length = 60000, 0.1, 12

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -350,3 +352,14 @@ def test_where_a_channel_sticks_a_few_samples_at_the_greatest_force_are_no_ceili
         found = faults(force)
         assert found.limit_N is None
         assert found.stuck.sum() > 25
+
+
+def test_a_share_of_the_samples_is_of_those_that_count():
+    """What lies before the first step is history, and nothing of it is told."""
+    c = draw_case(3, ("stuck_samples",), 2.5, protocol="staircase", rate_hz=150.0, jitter="none", own_clock=False)
+    m = measurement(c)
+    m = replace(m, fit_from_s=float(0.6 * m.force_time_s[-1]))
+    said = diagnose(m, Model.from_dict(c.believed))
+    share = float(c.truth.flags["stuck"][m.counted()].mean())
+    found = next(cause for cause in said.causes if cause.id == "stuck_samples")
+    assert abs(found.parameters["fraction"].value - share) < 0.2 * share
