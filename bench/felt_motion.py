@@ -167,8 +167,8 @@ def _coarse(position_mm: Array) -> float:
 def _rested(
     position_mm: Array, clean_mm: Array, std_mm: Array, noise_mm: float, left_mm: float
 ) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Positions (n,), their standard deviations (n,), with one value for each hold whose samples are that of one; and
-    the number of the hold, from 1 on; 0: none."""
+    """Positions (n,), their standard deviations (n,): one for each hold whose samples are that of one, or for each
+    of the levels between which it creeps; and the number of the level, from 1 on; 0: none."""
     clean, std = clean_mm.copy(), std_mm.copy()
     hold = np.zeros(len(clean), dtype=np.intp)
     coarse, reached = _coarse(position_mm) > 0.0, dict[float, int]()
@@ -185,7 +185,8 @@ def _rested(
         level = float(inside.mean())
         halves = abs(float(inside[: n // 2].mean() - inside[n // 2 :].mean())) / (2.0 * noise_mm / np.sqrt(n))
         cuts = [] if coarse else _steps((inside - level) / noise_mm)
-        if float(np.sum((inside - level) ** 2)) <= noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n)) and (cuts or halves < LIKELY):
+        steady = float(np.sum((inside - level) ** 2)) <= noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n))
+        if steady and (cuts or halves < LIKELY):
             ahead, behind = position_mm[b + 1 : b + 1 + SHORTEST], position_mm[max(a - SHORTEST, 0) : a][::-1]
             edges = [a, *(a + EDGE + cut for cut in cuts), b + 1]
             levels = [float(inside[i:j].mean()) for i, j in pairwise([0, *cuts, n])]
