@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +20,10 @@ TARE_S = 1.0
 
 CHECK_S = 0.2
 """How long the force is averaged before and after backing off, and at the end of a rest between two approaches."""
+
+TURN_MM, TURN_S = 0.1, 0.3
+"""The way to the place of the tare ends so far in the direction of the pad, which is more than friction and play need
+to turn round, and takes so long, in which a slow cell is read often enough."""
 
 SLOWER = 8.0
 """The second approach is so many times slower than the first, for as many more samples at the surface."""
@@ -44,6 +49,9 @@ STARTING_S = 0.012
 
 NOT_WATCHED = "the cell's readings repeat in air for longer than a frozen cell could be told by: give it more decimals"
 
+FEW = 8
+"""Samples of a move that tell its force."""
+
 MOVED_MM, MOVED_SHARE = 0.05, 0.2
 """A move of so much at least must be seen in the measured positions, as that share of what was commanded."""
 
@@ -60,16 +68,24 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float, 
     """Average the force in free air and make it the zero; refuse where the probe already touches something.
 
     With a pad, the axis first backs off by `approach.retract` (as far as travel allows): if the force falls by more
-    than the touch threshold, there was contact. It is averaged over `seconds`. Raises `Stopped` with what was found.
+    than the touch threshold and more than friction makes of turning round, there was contact. It gets there from
+    further off, so that friction and play stand as on the way to the pad. The zero is averaged over `seconds`. Raises
+    `Stopped` with what was found.
     """
     before = yield from _average(loop, CHECK_S)
-    backed_mm = 0.0
+    backed_mm = rubs_N = 0.0
     if approach is not None:
         start = mover.here()
         lowest = loop.monitor.envelope.position_mm[0]
         target = max(lowest, start - approach.retract)
         backed_mm = start - target
-        yield from mover.go(target, slow_mm_s)
+        turned_mm = min(TURN_MM, 0.5 * backed_mm)
+        away = mover.watch()
+        yield from mover.go(max(lowest, target - turned_mm), slow_mm_s)
+        back = mover.watch()
+        unhurried_mm_s = max(min(slow_mm_s, turned_mm / TURN_S), mover.axis.slowest_mm_s)
+        yield from mover.go(max(lowest + turned_mm, target), unhurried_mm_s)
+        mover.unwatch()
         yield from loop.sleep(CHECK_S)
     window = mover.watch()
     yield from loop.sleep(seconds)
@@ -82,13 +98,18 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float, 
     air = air_of(np.array(window.force_time_s), np.array(window.gross_N))
     fall = before - air.mean_N
     touch = threshold_N(approach.force if approach is not None else 0.0, air)
-    if approach is not None and backed_mm > 0 and fall > touch:
+    if backed_mm > 0:
+        rubs_N, moving_N = _friction_N(away, back, air)
+        air = replace(air, moving_N=moving_N)
+    if approach is not None and backed_mm > 0 and fall > touch + rubs_N:
         raise Stopped(
             f"the probe already touches something: the force fell by {fall:.3f} N when it backed off "
             f"{backed_mm:.2f} mm (threshold {touch:.3f} N); retract the probe (or lower the pad) and start again"
         )
     asked_N = approach.force if approach is not None else 0.0
-    if abs(air.drift_N_s) * seconds > max(asked_N, min(5.0 * air.sigma_N, unsteady_N(np.array(window.gross_N)))):
+    # a servo that settles creeps within what friction needs to turn round
+    steady_N = max(asked_N, min(5.0 * air.sigma_N, unsteady_N(np.array(window.gross_N)))) + 0.5 * rubs_N
+    if abs(air.drift_N_s) * seconds > steady_N:
         raise Stopped(
             f"the force is not steady in air ({air.drift_N_s:+.3f} N/s): the probe touches something, "
             "or the load cell is still warming up; no zero can be taken"
@@ -107,9 +128,20 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float, 
             "samples": air.samples,
             "contact_check": "passed" if backed_mm > 0 else "not possible: no travel to back off",
             "backed_off_mm": backed_mm,
+            "friction_turns_N": rubs_N,
         },
     )
     return air
+
+
+def _friction_N(away: Window, back: Window, air: Air) -> tuple[float, float]:
+    """From moves in air, away from the pad and back: what turning round makes of the force, and by how much more the
+    cell reads on the way to the pad than at rest. 0 where it does not show."""
+    if min(len(away.gross_N), len(back.gross_N)) < FEW:
+        return 0.0, 0.0
+    towards_N = float(np.median(back.gross_N))
+    turns_N, moving_N = towards_N - float(np.median(away.gross_N)), towards_N - air.mean_N
+    return (turns_N, max(moving_N, 0.0)) if turns_N > air.sigma_N else (0.0, 0.0)
 
 
 def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_sigma_mm: float) -> Script[Surface]:

@@ -27,12 +27,14 @@ MIN_SAMPLES_IN_CONTACT = 4
 
 @dataclass(frozen=True)
 class Air:
-    """The load cell in free air: `mean_N`, `sigma_N` (one sample, trend removed), `drift_N_s`."""
+    """The load cell in free air: `mean_N`, `sigma_N` (one sample, trend removed), `drift_N_s`; `moving_N`: by how much
+    more it reads on the way to the pad, where friction is felt."""
 
     mean_N: float
     sigma_N: float
     drift_N_s: float
     samples: int
+    moving_N: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -79,8 +81,9 @@ def unsteady_N(force_N: Array) -> float:
 
 
 def threshold_N(asked_N: float, air: Air) -> float:
-    """The force that counts as contact: what the protocol asks, but at least five sigma of the air noise."""
-    return max(asked_N, SIGMAS * air.sigma_N)
+    """The force that counts as contact: what the protocol asks, but at least five sigma of the air noise; either beyond
+    what friction makes of the way there."""
+    return air.moving_N + max(asked_N, SIGMAS * air.sigma_N)
 
 
 def find_surface(position_mm: Array, force_N: Array, sigma_N: float, position_sigma_mm: float = 0.0) -> Surface | None:

@@ -107,7 +107,7 @@ def test_a_cell_lost_before_there_is_a_surface(tmp_path):
     done = run(
         tmp_path,
         merged(DEEP, {"approach": {"speed": 1}}),
-        hook=once(lambda s, label: s > 2.2, falls_silent("load_cell")),
+        hook=once(lambda s, label: s > 2.6, falls_silent("load_cell")),
     )
     stopped_well(done, "^the load cell is silent")
     assert done.recording.surface_mm is None
