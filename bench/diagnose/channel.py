@@ -19,6 +19,7 @@ from bench.recording.types import Measurement
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+RARE = 1e-3  # of the samples that repeat the one before, at the least, where digits are not so many
 FEW_REPEATS = 4  # equal pairs that are no accident where digits are many
 WIDEST = 0.67  # logarithm of changes by one step over those by two: noise of some steps
 BELOW = 0.7  # of the greatest force
@@ -285,16 +286,16 @@ def _stuck(force: Array, but: Mask) -> Mask:
     runs = length[~but[first]]
     if len(runs) < 2:
         return mask
-    step = resolution(force)
     # how often a sample equals the one before when nothing sticks: judged where values change most
     same = np.concatenate([[0.0], (np.diff(force) == 0).astype(float)])
-    if step == 0.0:
-        least = 2 if _never_equal(force, int(same.sum())) else 3 if np.mean(same) < 0.2 else 4
-    else:
+    if resolution(force) > 0.0:
         window = max(len(force) // 40, 20)
         shares = np.convolve(same, np.ones(window) / window, mode="same")
-        p = min(max(float(np.median(shares[window:-window] if len(force) > 3 * window else shares)), 0.05), 0.97)
-        least = int(np.ceil(np.log(CHANCE / len(force)) / np.log(p))) + 1
+        p = max(float(np.median(shares[window:-window] if len(force) > 3 * window else shares)), 0.05)
+    else:
+        p = 0.0 if _never_equal(force, int(same.sum())) else max(float(np.mean(same)), RARE)
+    p = min(p, 0.97)
+    least = int(np.ceil(np.log(CHANCE / len(force)) / np.log(p))) + 1 if p > 0.0 else 2
     for start, count in zip(first.tolist(), length.tolist(), strict=True):
         if count >= least and not but[start]:
             mask[start + 1 : start + count] = True
@@ -342,10 +343,14 @@ def _halted(force: Array, but: Mask) -> tuple[Mask, float | None]:
 
 def _never_equal(force: Array, repeats: int) -> bool:
     """Whether samples have so many digits that two in a row agree by chance far less often than `repeats` times."""
-    steps = np.diff(np.unique(force))
-    finest = float(steps.min()) if len(steps) else 0.0
-    change = 1.4826 * float(np.median(np.abs(np.diff(force))))
-    expected = len(force) * finest / max(np.sqrt(2.0 * np.pi) * change, 1e-300)
+    change = np.abs(np.diff(force))
+    least = 1e-9 * float(np.ptp(force))
+    sizes, counts = np.unique(np.rint(change[change > least] / max(least, 1e-300)), return_counts=True)
+    if (counts >= FEW_REPEATS).any():  # changes come in steps: those of 0 are as many as of one step either way
+        expected = 0.5 * float(counts[np.argmax(counts >= FEW_REPEATS)])
+    else:
+        finest = least * float(sizes[0]) if len(sizes) else 0.0
+        expected = len(force) * finest / max(np.sqrt(2.0 * np.pi) * 1.4826 * float(np.median(change)), 1e-300)
     return repeats >= FEW_REPEATS and repeats > 8.0 * expected
 
 

@@ -168,7 +168,21 @@ def _forces(recording: Recording, delays: Delays, notes: list[str]) -> tuple[Arr
     if bad:
         notes.append(f"{bad} force samples that the device called bad (overload) left out")
     good = ~flagged
-    return _channel("force", cell.time_s[good] - delays.force_s, cell.force_N[good], notes)
+    return _channel("force", cell.time_s[good] - delays.force_s, _on_one_zero(recording)[good], notes)
+
+
+def _on_one_zero(recording: Recording) -> Array:
+    """Net forces (n,), N, those before the tare on the zero that it set: what a model remembers of them is force too,
+    and a coarse channel has one grid of values."""
+    cell, taken = recording.load_cell, [event.time_s for event in recording.events if event.name == "tare"]
+    if not taken:
+        return cell.force_N
+    before = cell.time_s < taken[-1]
+    tare = (cell.gross_N - cell.force_N)[~before]
+    tare = tare[np.isfinite(tare)]
+    if not len(tare) or not np.isfinite(cell.gross_N[before]).all():
+        return cell.force_N
+    return np.where(before, cell.gross_N - float(np.median(tare)), cell.force_N)
 
 
 def _zero_std_N(recording: Recording) -> float:

@@ -363,3 +363,16 @@ def test_a_share_of_the_samples_is_of_those_that_count():
     share = float(c.truth.flags["stuck"][m.counted()].mean())
     found = next(cause for cause in said.causes if cause.id == "stuck_samples")
     assert abs(found.parameters["fraction"].value - share) < 0.2 * share
+
+
+@pytest.mark.parametrize("other_zero_N", [0.0, 0.2304])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fine_scale_that_repeats_itself_by_chance_does_not_stick(seed, other_zero_N):
+    """So many levels that there seems to be no step; and a zero that was set on the way, which doubles them."""
+    rng, t = np.random.default_rng(seed), np.arange(6000)
+    force = 2.0 * np.sin(t / 900.0) ** 2 + 0.01 * rng.standard_normal(t.size)
+    force = np.round(force / 0.001) * 0.001 - np.where(t < 400, 0.0, other_zero_N)
+    assert not faults(force).stuck.any()
+    held = force.copy()
+    held[3000:3020] = held[2999]
+    assert faults(held).stuck[3001:3019].all() and faults(held).stuck.sum() < 24

@@ -91,3 +91,11 @@ def test_found_through_the_wire(tmp_path, padbench):
     assert said["verdict"] == "explained" and said["causes"][0]["id"] == "frame_compliance"
     number = said["causes"][0]["parameters"]["compliance"]
     assert abs(number["value"] - 0.02) <= max(0.002, 2 * number["std"])
+
+
+@pytest.mark.parametrize("base", ["simulated_laumas", "simulated_balance", "simulated_smc_lec"])
+def test_a_clean_run_is_consistent_on_other_benches(tmp_path, padbench, base):
+    folder: Path = run(tmp_path, "quick", base, simulation={"seed": 7}).folder
+    assert padbench("diagnose", folder, "--model", "polyurethane", "--json", tmp_path / "said.json").status == 0
+    said = json.loads((tmp_path / "said.json").read_text("utf-8"))
+    assert said["verdict"] == "consistent", said["causes"]

@@ -47,6 +47,16 @@ def test_a_run_becomes_a_measurement(tmp_path):
         assert "outside" not in said, "how every run begins is not worth a word"
 
 
+def test_forces_before_the_tare_are_on_the_zero_that_it_set():
+    t, gross = np.arange(40) / 10, 0.3 + 0.001 * np.arange(40)
+    net = gross - np.where(t < 2.0, 0.0, 0.2304)
+    nan = np.full(t.size, np.nan)
+    motor, cell = MotorChannel(t, t, nan, nan, t), ForceChannel(t, net, gross, t, np.zeros(t.size, dtype=bool))
+    events = [Event(2.0, "tare", {"tare_N": 0.2304})]
+    m = Recording(Path("data.csv"), motor, cell, surface_mm=0.0, events=events).measurement()
+    np.testing.assert_allclose(m.force_N, gross - 0.2304, atol=1e-12)
+
+
 def test_csv_counts_throughout(tmp_path):
     path = tmp_path / "pad 3.csv"
     path.write_text("time_s,position_mm,force_N\n0,0,0.1\n0.1,1,0.2\n0.2,2,0.3\n")
