@@ -36,6 +36,7 @@ LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
 BENDS_AT = (0.08, 0.14, 0.2, 0.28, 0.38, 0.5, 0.7)  # of the depth reached
 MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich
+FRESH = 0.9  # of the depth reached, beyond which a softening pad must go for the first time in the run
 LONGEST_REPORTED = 0.7  # of the depth, for errors of the position: longer ones are another elastic law
 
 
@@ -87,6 +88,9 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         lower, upper = max(lower, SHORTEST * longest_mm), min(upper, longest_mm)
     elif p.name == "range":  # a pull beyond the widest gap is a bias; a pad may lag by half its depth
         upper = min(upper, reach.travel_mm - 0.5 * reach.depth_mm)
+    elif p.name == "already":  # pressed before as deep as this run goes: then nothing softens in it, and it is a law
+        upper = min(upper, FRESH * reach.depth_mm)
+        starts = tuple(share * reach.depth_mm for share in (0.25, 0.5, 0.75)) if starts else ()
     elif p.name == "reach":
         default = reach.depth_mm
     elif p.name == "moved_at":

@@ -85,3 +85,11 @@ def test_a_pull_reaches_no_further_than_the_way_on_which_it_is_seen(travel_mm):
     for form in effect("adhesion").forms:
         pull = next(p for p in narrowed(form, reach).parameters if p.name == "range")
         assert max(pull.starts) <= pull.upper <= travel_mm
+
+
+def test_what_was_pressed_before_as_deep_as_the_run_goes_does_not_soften_in_it():
+    """It is a law then, of which these data see no other branch."""
+    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=2.0, depth_mm=1.5, force_N=5.0)
+    form = narrowed(effect("stress_softening").form("preconditioned"), reach)
+    already = next(p for p in form.parameters if p.name == "already")
+    assert already.upper < 1.5 and already.starts and max(already.starts) <= already.upper
