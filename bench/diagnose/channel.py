@@ -293,7 +293,7 @@ def _stuck(force: Array, but: Mask) -> Mask:
         shares = np.convolve(same, np.ones(window) / window, mode="same")
         p = max(float(np.median(shares[window:-window] if len(force) > 3 * window else shares)), 0.05)
     else:
-        p = 0.0 if _never_equal(force, int(same.sum())) else max(float(np.mean(same)), RARE)
+        p = 0.0 if _never_equal(force, int(same.sum())) else max(_equal_by_chance(force) / len(force), RARE)
     p = min(p, 0.97)
     least = int(np.ceil(np.log(CHANCE / len(force)) / np.log(p))) + 1 if p > 0.0 else 2
     for start, count in zip(first.tolist(), length.tolist(), strict=True):
@@ -343,15 +343,19 @@ def _halted(force: Array, but: Mask) -> tuple[Mask, float | None]:
 
 def _never_equal(force: Array, repeats: int) -> bool:
     """Whether samples have so many digits that two in a row agree by chance far less often than `repeats` times."""
+    return repeats >= FEW_REPEATS and repeats > 8.0 * _equal_by_chance(force)
+
+
+def _equal_by_chance(force: Array) -> float:
+    """How many samples agree with the one before by chance, in a channel of many digits."""
     change = np.abs(np.diff(force))
     least = 1e-9 * float(np.ptp(force))
     sizes, counts = np.unique(np.rint(change[change > least] / max(least, 1e-300)), return_counts=True)
     if (counts >= FEW_REPEATS).any():  # changes come in steps: those of 0 are as many as of one step either way
-        expected = 0.5 * float(counts[np.argmax(counts >= FEW_REPEATS)])
-    else:
-        finest = least * float(sizes[0]) if len(sizes) else 0.0
-        expected = len(force) * finest / max(np.sqrt(2.0 * np.pi) * 1.4826 * float(np.median(change)), 1e-300)
-    return repeats >= FEW_REPEATS and repeats > 8.0 * expected
+        return 0.5 * float(counts[np.argmax(counts >= FEW_REPEATS)])
+    finest = least * float(sizes[0]) if len(sizes) else 0.0
+    scatter = 1.4826 * float(np.median(change))
+    return len(force) * finest / max(float(np.sqrt(2.0 * np.pi)) * scatter, 1e-300)
 
 
 def _spikes(force: Array, good: Mask) -> Mask:
