@@ -35,9 +35,9 @@ def known(c: Case, **off: float) -> Model:
     ("id", "shape", "rate_Hz", "off"),
     [
         ("friction", "coulomb", 120.0, {"coulomb": 0.8}),
-        ("inertia", "rigid", 300.0, {"mass": 1.2}),
+        pytest.param("inertia", "rigid", 300.0, {"mass": 1.2}, marks=pytest.mark.long),
         ("encoder_error", "reported", 120.0, {"amplitude": 1.1}),
-        ("cogging", "sine", 120.0, {"amplitude": 1.1}),
+        pytest.param("cogging", "sine", 120.0, {"amplitude": 1.1}, marks=pytest.mark.long),
     ],
 )
 def test_what_is_believed_already_is_not_found_again(id, shape, rate_Hz, off):

@@ -52,6 +52,7 @@ def test_the_worked_example_finds_the_friction_of_its_strokes(example: Outcome) 
 
 
 @measured
+@pytest.mark.long
 def test_an_axis_is_given_the_names_of_a_bench() -> None:
     found = of("emps_linear_axis", "emps_train.csv")
     assert found.diagnosis is not None

@@ -288,11 +288,11 @@ def test_a_cable_that_breaks_under_load(tmp_path):
 
 
 def hastened(name: str) -> dict[str, Any]:
-    """A shipped protocol with its holds no longer than five seconds: nothing new happens in the rest of them."""
+    """A shipped protocol with its holds no longer than two seconds: nothing new happens in the rest of them."""
 
     def short(part: Any) -> Any:
         if isinstance(part, dict):
-            return {k: min(v, 5) if k in ("hold", "rest", "air") else short(v) for k, v in part.items()}
+            return {k: min(v, 2) if k in ("hold", "rest", "air") else short(v) for k, v in part.items()}
         return [short(item) for item in part] if isinstance(part, list) else part
 
     protocol: dict[str, Any] = short(yaml.safe_load(find_file("protocol", name).read_text("utf-8")))
