@@ -183,10 +183,11 @@ def _rested(
         if n < SHORTEST:
             continue
         level = float(inside.mean())
+        if float(np.sum((inside - level) ** 2)) > noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n)):
+            continue
         halves = abs(float(inside[: n // 2].mean() - inside[n // 2 :].mean())) / (2.0 * noise_mm / np.sqrt(n))
         cuts = [] if coarse else _steps((inside - level) / noise_mm)
-        steady = float(np.sum((inside - level) ** 2)) <= noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n))
-        if steady and (cuts or halves < LIKELY):
+        if cuts or halves < LIKELY:
             ahead, behind = position_mm[b + 1 : b + 1 + SHORTEST], position_mm[max(a - SHORTEST, 0) : a][::-1]
             edges = [a, *(a + EDGE + cut for cut in cuts), b + 1]
             levels = [float(inside[i:j].mean()) for i, j in pairwise([0, *cuts, n])]

@@ -125,7 +125,7 @@ def _stray_again(force: Array, outlier: Mask, stuck: Mask) -> Mask:
 def _one_value(force: Array, outlier: Mask) -> Mask:
     """Samples with a value that stray ones have again and again, where readings have many digits."""
     values, count = np.unique(force[outlier], return_counts=True)
-    if resolution(force) == 0.0 and _never_equal(force, int(count.max(initial=0))):
+    if resolution(force) == 0.0 and _no_accident(int(count.max(initial=0)), _equal_by_chance(force)):
         return np.isin(force, values[count >= FEW_REPEATS])
     return np.zeros(len(force), dtype=bool)
 
@@ -293,7 +293,8 @@ def _stuck(force: Array, but: Mask) -> Mask:
         shares = np.convolve(same, np.ones(window) / window, mode="same")
         p = max(float(np.median(shares[window:-window] if len(force) > 3 * window else shares)), 0.05)
     else:
-        p = 0.0 if _never_equal(force, int(same.sum())) else max(_equal_by_chance(force) / len(force), RARE)
+        chance = _equal_by_chance(force)
+        p = 0.0 if _no_accident(int(same.sum()), chance) else max(chance / len(force), RARE)
     p = min(p, 0.97)
     least = int(np.ceil(np.log(CHANCE / len(force)) / np.log(p))) + 1 if p > 0.0 else 2
     for start, count in zip(first.tolist(), length.tolist(), strict=True):
@@ -341,9 +342,9 @@ def _halted(force: Array, but: Mask) -> tuple[Mask, float | None]:
     return mask, None
 
 
-def _never_equal(force: Array, repeats: int) -> bool:
-    """Whether samples have so many digits that two in a row agree by chance far less often than `repeats` times."""
-    return repeats >= FEW_REPEATS and repeats > 8.0 * _equal_by_chance(force)
+def _no_accident(repeats: int, chance: float) -> bool:
+    """Whether equal samples are far more than the `chance` ones."""
+    return repeats >= FEW_REPEATS and repeats > 8.0 * chance
 
 
 def _equal_by_chance(force: Array) -> float:

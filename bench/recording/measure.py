@@ -17,7 +17,7 @@ from bench import yamlfile
 from bench.errors import InputError
 from bench.recording.between import between_polls
 from bench.recording.schemas import BENCH_FILE, NO_SURFACE, STOPPED
-from bench.recording.types import Array, Measurement, Recording
+from bench.recording.types import Array, Event, Measurement, Recording
 
 GAP = 5.0
 """A pause between samples of more than so many usual periods is reported."""
@@ -174,23 +174,20 @@ def _forces(recording: Recording, delays: Delays, notes: list[str]) -> tuple[Arr
 def _on_one_zero(recording: Recording) -> Array:
     """Net forces (n,), N, those before the tare on the zero that it set: what a model remembers of them is force too,
     and a coarse channel has one grid of values."""
-    cell, taken = recording.load_cell, [event.time_s for event in recording.events if event.name == "tare"]
-    if not taken:
+    cell, tare = recording.load_cell, _tare(recording)
+    tare_N = tare.data.get("tare_N") if tare is not None else None
+    if tare is None or not isinstance(tare_N, int | float) or not np.isfinite(tare_N):
         return cell.force_N
-    before = cell.time_s < taken[-1]
-    tare = (cell.gross_N - cell.force_N)[~before]
-    tare = tare[np.isfinite(tare)]
-    if not len(tare) or not np.isfinite(cell.gross_N[before]).all():
-        return cell.force_N
-    return np.where(before, cell.gross_N - float(np.median(tare)), cell.force_N)
+    before = (cell.time_s < tare.time_s) & np.isfinite(cell.gross_N)
+    return np.where(before, cell.gross_N - tare_N, cell.force_N)
 
 
 def _zero_std_N(recording: Recording) -> float:
     """Standard deviation of the tare: its noise over its samples, which a device's filter makes fewer."""
-    taken = [event for event in recording.events if event.name == "tare"]
-    if not taken:
+    tare = _tare(recording)
+    if tare is None:
         return 0.0
-    sigma, samples = taken[-1].data.get("sigma_N"), taken[-1].data.get("samples")
+    sigma, samples = tare.data.get("sigma_N"), tare.data.get("samples")
     if not isinstance(sigma, int | float) or not isinstance(samples, int | float) or samples < 1 or sigma < 0:
         return 0.0
     return float(sigma) * float(np.sqrt(FILTERED / samples))
@@ -198,8 +195,13 @@ def _zero_std_N(recording: Recording) -> float:
 
 def _tared_s(recording: Recording) -> tuple[float, float] | None:
     """The time of the samples that the tare averaged: those before its event."""
-    taken = [event.time_s for event in recording.events if event.name == "tare"]
-    return (taken[-1] - TARED_S, taken[-1]) if taken else None
+    tare = _tare(recording)
+    return (tare.time_s - TARED_S, tare.time_s) if tare is not None else None
+
+
+def _tare(recording: Recording) -> Event | None:
+    """The tare that holds: the last."""
+    return next((event for event in reversed(recording.events) if event.name == "tare"), None)
 
 
 def _span(recording: Recording, place: str) -> tuple[float, float]:

@@ -73,6 +73,7 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float, 
     `Stopped` with what was found.
     """
     before = yield from _average(loop, CHECK_S)
+    asked_N = approach.force if approach is not None else 0.0
     backed_mm = rubs_N = 0.0
     if approach is not None:
         start = mover.here()
@@ -81,10 +82,11 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float, 
         backed_mm = start - target
         turned_mm = min(TURN_MM, 0.5 * backed_mm)
         away = mover.watch()
-        yield from mover.go(max(lowest, target - turned_mm), slow_mm_s)
+        furthest = max(lowest, target - turned_mm)
+        yield from mover.go(furthest, slow_mm_s)
         back = mover.watch()
         unhurried_mm_s = max(min(slow_mm_s, turned_mm / TURN_S), mover.axis.slowest_mm_s)
-        yield from mover.go(max(lowest + turned_mm, target), unhurried_mm_s)
+        yield from mover.go(furthest + turned_mm, unhurried_mm_s)
         mover.unwatch()
         yield from loop.sleep(CHECK_S)
     window = mover.watch()
@@ -96,17 +98,15 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float, 
             "raise the load cell's rate"
         )
     air = air_of(np.array(window.force_time_s), np.array(window.gross_N))
-    fall = before - air.mean_N
-    touch = threshold_N(approach.force if approach is not None else 0.0, air)
     if backed_mm > 0:
         rubs_N, moving_N = _friction_N(away, back, air)
+        fall, touch = before - air.mean_N, threshold_N(asked_N, air)
+        if fall > touch + rubs_N:
+            raise Stopped(
+                f"the probe already touches something: the force fell by {fall:.3f} N when it backed off "
+                f"{backed_mm:.2f} mm (threshold {touch:.3f} N); retract the probe (or lower the pad) and start again"
+            )
         air = replace(air, moving_N=moving_N)
-    if approach is not None and backed_mm > 0 and fall > touch + rubs_N:
-        raise Stopped(
-            f"the probe already touches something: the force fell by {fall:.3f} N when it backed off "
-            f"{backed_mm:.2f} mm (threshold {touch:.3f} N); retract the probe (or lower the pad) and start again"
-        )
-    asked_N = approach.force if approach is not None else 0.0
     # a servo that settles creeps within what friction needs to turn round
     steady_N = max(asked_N, min(5.0 * air.sigma_N, unsteady_N(np.array(window.gross_N)))) + 0.5 * rubs_N
     if abs(air.drift_N_s) * seconds > steady_N:
