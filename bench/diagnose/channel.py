@@ -9,21 +9,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import poisson
 from scipy.stats import t as student_t
 
 from bench.felt_motion import resolution
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 
+from .coarse import coarse_repeats
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-RARE = 1e-3  # of the samples that repeat the one before, at the least, where digits are not so many
+AGAIN = 0.01  # of the samples that repeat the one before, at the least, where digits are not so many
 FEW_REPEATS = 4  # equal pairs that are no accident where digits are many
-WIDEST = 0.67  # logarithm of changes by one step over those by two: noise of some steps
-BELOW = 0.7  # of the greatest force
-MORE, SURELY = 0.05, 4.0  # of the equal pairs that chance makes, and of their deviations
 CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
 SETTLING = 20  # samples after a move that are not yet a hold
 LEAVING = 3  # samples at the end of a hold that may already move
@@ -52,7 +50,7 @@ FALSE_SHARE, SEVERAL = 0.02, 10  # of values beyond the limit that may be noise,
 AROUND_S = 0.02  # either side of a sample, where its speed and acceleration are looked at
 TOGETHER, ONE_WAY = 0.5, 0.5  # of strays, that have another beside them, or go with the motion: fewer do
 MOSTLY = 0.5  # of the samples that stand off
-RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data; or chance of repeats
+RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,7 @@ def faults(force_N: Array) -> Faults:
     # just below a ceiling that is not sharp a channel repeats itself too
     ended = saturated if limit is None else saturated | (force_N * np.sign(limit) > NEARLY * abs(limit))
     stuck = _stuck(force_N, ended) | _slowed(force_N, ended)
-    halted, share = _halted(force_N, ended | stuck)
+    halted, share = coarse_repeats(force_N, ended | stuck)
     if not stuck.any():
         stuck = halted
     outlier = _spikes(force_N, ~(saturated | stuck))
@@ -294,52 +292,13 @@ def _stuck(force: Array, but: Mask) -> Mask:
         p = max(float(np.median(shares[window:-window] if len(force) > 3 * window else shares)), 0.05)
     else:
         chance = _equal_by_chance(force)
-        p = 0.0 if _no_accident(int(same.sum()), chance) else max(chance / len(force), RARE)
+        p = 0.0 if _no_accident(int(same.sum()), chance) else max(chance / len(force), AGAIN)
     p = min(p, 0.97)
     least = int(np.ceil(np.log(CHANCE / len(force)) / np.log(p))) + 1 if p > 0.0 else 2
     for start, count in zip(first.tolist(), length.tolist(), strict=True):
         if count >= least and not but[start]:
             mask[start + 1 : start + count] = True
     return mask
-
-
-def _halted(force: Array, but: Mask) -> tuple[Mask, float | None]:
-    """Samples that repeat the one before, in a coarse channel, which repeats itself anyway: those in motion that do so
-    more likely by sticking than by chance; and the share of all samples that stick (None: none that is sure).
-
-    Chance makes as many changes of 0 steps as those of 1 to 4 steps foretell, whose logarithms go down with the square;
-    that holds for noise of any colour, which only makes it narrower.
-    """
-    mask, step = np.zeros(len(force), dtype=bool), resolution(force)
-    if step == 0.0:
-        return mask, None
-    but = but | (np.abs(force) > BELOW * float(np.abs(force).max()))  # where an amplifier that ends narrows the noise
-    change = np.rint(np.diff(force) / step).astype(np.intp)
-    change = change[~(but[1:] | but[:-1])]
-    none = float(np.count_nonzero(change == 0))
-    counts = np.array([np.count_nonzero(np.abs(change) == k) / 2.0 for k in range(1, 5)])
-    if counts.min() < 50 or np.log(counts[0] / counts[1]) > WIDEST:
-        return mask, None
-    # counts weigh as much as they are sure of
-    A = np.stack([np.ones(4), np.arange(1.0, 5.0) ** 2], axis=1)
-    inverse = np.linalg.inv((A * (2.0 * counts)[:, None]).T @ A)
-    level, slope = (inverse @ (A * (2.0 * counts)[:, None]).T @ np.log(counts)).tolist()
-    foretold = float(np.exp(level))
-    more = none - foretold
-    if more < max(MORE * foretold, SURELY * np.sqrt(foretold + foretold**2 * inverse[0, 0])):
-        return mask, None
-    share = more / len(change)
-    own = step * np.sqrt(0.5 / max(-slope, 1e-6))  # scatter of a change
-    # a pair counts with the change that its neighbours foretell, whether it is equal or not
-    before, after = force[1:-2] - force[:-3], force[3:] - force[2:-1]
-    usual = (force[3:] - force[:-3]) / 3.0
-    chance = step / (np.sqrt(2.0 * np.pi) * own) * np.exp(-0.5 * (usual / own) ** 2)
-    telling = (before * after > 0) & (chance < share) & ~(but[1:-2] | but[2:-1])
-    equal = telling & (force[1:-2] == force[2:-1])
-    if poisson.sf(int(equal.sum()) - 1, float(chance[telling].sum())) < 0.1 * RARE:
-        mask[np.flatnonzero(equal) + 2] = True
-        return mask, share
-    return mask, None
 
 
 def _no_accident(repeats: int, chance: float) -> bool:

@@ -58,6 +58,20 @@ def test_repeats_in_a_coarse_channel_are_told_by_how_often_they_come():
         assert not (found.stuck & ~repeats).any()
 
 
+def test_repeats_in_motion_are_told_where_a_coarse_channel_hides_those_at_rest():
+    """Noise of less than a step, and one reading in ten lost while the force moves, one in a hundred at rest."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        clean = _steps(rng, 0.004, 0.003)
+        assert not faults(clean).stuck.any()
+        moves = np.abs(np.gradient(np.convolve(clean, np.ones(9) / 9.0, mode="same"))) > 0.01
+        stuck = rng.random(len(clean)) < np.where(moves, 0.1, 0.01)
+        stuck[0] = False
+        found = faults(clean[np.maximum.accumulate(np.where(stuck, 0, np.arange(len(clean))))]).stuck
+        assert (found & stuck).sum() >= 10
+        assert (found & ~stuck).sum() <= 0.1 * found.sum()
+
+
 def _scored(said: np.ndarray, true: np.ndarray) -> tuple[float, float]:
     """(precision, recall) of samples (n,)."""
     hits = float((said & true).sum())
