@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from .candidates import CHANNEL
 from .channel import FEW, Faults, faults, not_of_the_motion, of_the_model, resting, standing_off, strays
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
-from .evidence import MOST_LEFT, SPEAKS, beyond_limit
+from .evidence import MOST_LEFT, SPEAKS, beyond_limit, of_slow_force
 from .held_out import SEEN, held_out_square, later_square
 from .hum import Line
 from .hum import find as line_of
@@ -88,9 +89,10 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     squares, excess = excesses(prepared, fits, floor)
     apart = _flagged_square(prepared, fits[0])
     while len(fits) > 1:
-        needless = _needless(prepared, fits, squares, excess, apart)
+        slow = _slow_squares(prepared, fits, squares)
+        needless = _needless(prepared, fits, squares, excess, apart, slow)
         if needless is None:
-            needless = _doubtful(path, fits, excess, apart, floor)
+            needless = _doubtful(path, fits, excess, apart, floor, slow)
         if needless is None:
             break
         fits, squares, excess = _dropped(prepared, fits, needless, floor)
@@ -111,8 +113,14 @@ def _dropped(
     return fits, *excesses(prepared, fits, floor_N)
 
 
+def _slow_squares(prepared: Prepared, fits: list[Fit], squares: list[float]) -> list[float]:
+    """What each step's cause leaves that is of the force's zero, found before and of another course (N²)."""
+    shares = [of_slow_force(prepared.full, *step, fits[0]) for step in pairwise(fits)]
+    return [share * square for share, square in zip(shares, squares[1:], strict=True)]
+
+
 def _needless(
-    prepared: Prepared, fits: list[Fit], squares: list[float], excess: list[float], apart: float
+    prepared: Prepared, fits: list[Fit], squares: list[float], excess: list[float], apart: float, slow: list[float]
 ) -> int | None:
     """Number of a cause that is of no use for what was held out, or does harm to what comes later; None: all are."""
     own = len(fits[0].structure.causes)
@@ -129,7 +137,7 @@ def _needless(
         if taken <= 0.0:
             return k
         small = gain <= (LEAST if last == 0 else FURTHER) * scale
-        most_left = k < 2 and gain >= MOST_LEFT * left and gain >= SPEAKS * prepared.floor_N**2
+        most_left = k < 2 and gain >= MOST_LEFT * (left - slow[k]) and gain >= SPEAKS * prepared.floor_N**2
         if small and not most_left:
             return k
     later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
@@ -148,7 +156,9 @@ def _needless(
     return best if later > HARM * rest[best] else None
 
 
-def _doubtful(path: Path, fits: list[Fit], excess: list[float], apart: float, floor_N: float) -> int | None:
+def _doubtful(
+    path: Path, fits: list[Fit], excess: list[float], apart: float, floor_N: float, slow: list[float]
+) -> int | None:
     """Number of a further cause whose name is hardly sure, and that takes little, and less than is left: what left the
     one may have left the other. Or of one that takes next to nothing, and far less than the noise, under a name that
     may be another, where the rest is as good as explained without it: no shape is exact, and what it misses looks like
@@ -158,7 +168,7 @@ def _doubtful(path: Path, fits: list[Fit], excess: list[float], apart: float, fl
         _, confidence, kind = sureness(path, named[k - 1], named)
         taken = excess[k - 1] - excess[k]
         sure = max(confidence, kind)
-        if sure < DOUBTED and taken < min(LITTLE * (excess[0] + apart), excess[-1]):
+        if sure < DOUBTED and taken < min(LITTLE * (excess[0] + apart), excess[-1] - slow[k - 1]):
             return k - 1
         trace = TRACE * excess[0]
         if sure < NAMED and taken < min(trace, FAINT * floor_N**2) and taken + excess[-1] < 2.0 * trace:

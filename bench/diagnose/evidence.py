@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
 from scipy.stats import chi2 as chi2_law
 
 from sim.effects.base import Parameter
 
 from .channel import FAR
 from .data import Data, Prepared
-from .refit import Fit, force_at, reduced
+from .refit import Fit, errors, force_at, reduced
 
 Mask = NDArray[np.bool_]
 
@@ -26,6 +27,8 @@ RIVAL = 25.0  # Δχ², rescaled by what is left: less excludes no rival
 FEWEST = 3  # samples at fault that are called a fault
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 TRACE = 2e-4  # the same, of one that takes most of what a far larger one leaves: no shape is so exact
+
+SLOW, KNOTS = ("force_bias", "force_drift"), 24  # causes that are a force of time alone; and the pieces of its course
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Evidence:
     crumb: float
     """Δχ² over the number of samples."""
     of_left: float
-    """Of what was left before the step."""
+    """Of what was left before the step, but for what is an earlier cause's of another course."""
     known: int
     """Causes found before."""
 
@@ -72,9 +75,12 @@ def least_gain(base: Fit, memory: float, samples: float, expected: float, first:
     return need if first else max(need, min(SHARE * (base.chi2 - expected), SPEAKS * samples))
 
 
-def evidence_of(before: Fit, after: Fit, base: Fit, memory: float, samples: float, expected: float) -> Evidence:
+def evidence_of(
+    before: Fit, after: Fit, base: Fit, memory: float, samples: float, expected: float, slow: float = 0.0
+) -> Evidence:
     """What the step from `before` to `after` is worth; `memory`: samples that say the same as one, which χ² does not
-    know of; `expected`: χ² that noise alone leaves.
+    know of; `expected`: χ² that noise alone leaves; `slow`: share of what is left that is an
+    earlier cause's, of another course.
 
     What is left besides, of whatever cause, counts as noise where significance is asked (Fisher's ratio of variances).
     """
@@ -82,7 +88,7 @@ def evidence_of(before: Fit, after: Fit, base: Fit, memory: float, samples: floa
     misfit = max(after.chi2 / max(expected - after.free, 1.0), 1.0)
     freedom = max(after.free - before.free, 1)
     excess = max(base.chi2 - expected, 1e-9)
-    left = max(before.chi2 - expected, delta, 1e-9)
+    left = max(before.chi2 - expected - slow * after.chi2, delta, 1e-9)
     return Evidence(
         delta_chi2=delta,
         effective=delta / (memory * misfit),
@@ -93,6 +99,21 @@ def evidence_of(before: Fit, after: Fit, base: Fit, memory: float, samples: floa
         of_left=delta / left,
         known=len(before.structure.causes) - len(base.structure.causes),
     )
+
+
+def of_slow_force(data: Data, before: Fit, after: Fit, base: Fit) -> float:
+    """Share of what `after` leaves, noise and all, that a force of any slow course in time takes, where the causes
+    found before are no more than that: a zero that strays or drifts seldom does so along a textbook's curve. Else 0."""
+    found = before.structure.causes[len(base.structure.causes) :]
+    if not found or any(cause.id not in SLOW for cause in found):
+        return 0.0
+    first, last = float(data.time_s[0]), float(data.time_s[-1])
+    knots = np.concatenate([[first] * 3, np.linspace(first, last, KNOTS), [last] * 3])
+    courses = BSpline.design_matrix(data.time_s, knots, 3).toarray()
+    basis, _ = np.linalg.qr(np.stack([data.whitened(course) for course in courses.T], axis=1))
+    left = errors(data, after.structure, after.x)
+    taken = basis.T @ left
+    return max(float(np.sum(taken**2)) - len(taken), 0.0) / max(float(np.sum(left**2)), 1e-9)
 
 
 def penalty(free: int, effective: float) -> float:

@@ -60,10 +60,19 @@ class Path:
         judged)."""
         if id_ in self.compared:
             return self.compared[id_]
-        stages = list(zip(self.rivals, self.measures, strict=True))
-        for first in (True, False):
-            for ranked, measure in stages:
-                own = [t for t in ranked if t.id == id_]
-                if own and (not first or ranked[0].id == id_):
-                    return own[0], [t for t in ranked if t.id != id_], measure
-        return None
+        stages = [
+            (next(t for t in ranked if t.id == id_), ranked, measure)
+            for ranked, measure in zip(self.rivals, self.measures, strict=True)
+            if any(t.id == id_ for t in ranked)
+        ]
+        # one that came in place of another stood near it there, and far behind where it was no cause yet
+        own, ranked, measure = max(stages, key=lambda s: _of_the_best(*s), default=(None, [], None))
+        if own is None or measure is None:
+            return None
+        return own, [t for t in ranked if t.id != id_], measure
+
+
+def _of_the_best(own: Trial, ranked: list[Trial], measure: Measure) -> float:
+    """Share that a candidate takes of what the first of its stage takes."""
+    taken = measure.before - ranked[0].fit.chi2
+    return 1.0 if own is ranked[0] else min((measure.before - own.fit.chi2) / max(taken, 1e-9), 1.0)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .candidates import CHANNEL, Signatures, alike, combinations, forms, narrowed, starts
-from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, too_small, unexplained
+from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
 from .felt_errors import felt_errors
 from .numbers import Cause, cause_of
 from .path import Measure, Path, Trial
@@ -338,7 +338,8 @@ class Search(Sieve):
         data = self.prepared.judged_short
         if data is not self.short:
             before, after, base = (refit(data, fit.structure, fit.x, 8, 1e-6) for fit in (before, after, base))
-        return evidence_of(before, after, base, self.prepared.memory, self.samples, self.expected)
+        slow = of_slow_force(data, before, after, base)
+        return evidence_of(before, after, base, self.prepared.memory, self.samples, self.expected, slow)
 
     def exchanged(self, path: Path) -> Fit:
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left

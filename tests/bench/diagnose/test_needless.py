@@ -33,7 +33,9 @@ def needless(
 
     monkeypatch.setattr(module, "later_square", later_square)
     prepared: Any = SimpleNamespace(floor_N=1.0, floor_square_std=0.01)
-    return module._needless(prepared, fits, list(squares), [max(s - 1.0, 0.0) for s in squares], 0.0)
+    return module._needless(
+        prepared, fits, list(squares), [max(s - 1.0, 0.0) for s in squares], 0.0, [0.0] * len(squares)
+    )
 
 
 def test_of_two_that_hide_each_other_neither_is_needless(monkeypatch):

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.diagnose import verdict
+from bench.diagnose import evidence, verdict
 from bench.diagnose.evidence import TRACE, Evidence
+from bench.diagnose.path import Measure, Path
 from bench.diagnose.search import Search
 
 module = importlib.import_module("bench.diagnose.search")
@@ -201,4 +202,29 @@ def test_a_further_cause_that_takes_next_to_nothing_under_an_unsure_name_goes(mo
     diagnosis = importlib.import_module("bench.diagnose.diagnose")
     monkeypatch.setattr(diagnosis, "sureness", lambda path, name, named: ([], sure, sure))
     fits: list[Any] = [fit(0.0, *("backlash", "friction")[:k]) for k in range(3)]
-    assert diagnosis._doubtful(None, fits, excess, 0.0, 1.0) == goes
+    assert diagnosis._doubtful(None, fits, excess, 0.0, 1.0, [0.0] * len(excess)) == goes
+
+
+def test_a_cause_that_came_in_place_of_another_is_held_against_what_stood_beside_it_there():
+    """Not against those of an earlier turn, where it was far behind."""
+    told = [{"separation": 2000.0, "sensor_lag": 99000.0}, {"force_delay": 1100.0, "sensor_lag": 1101.0}]
+    turns: Any = [[SimpleNamespace(id=i, fit=fit(chi2)) for i, chi2 in turn.items()] for turn in told]
+    measures = [Measure(before, NOISE, NOISE, 1.0) for before in (100000.0, 2000.0)]
+    stage = Path([fit(1101.0)], rivals=turns, measures=measures).stage_of("sensor_lag")
+    assert stage is not None
+    assert [t.id for t in stage[1]] == ["force_delay"]
+
+
+def test_a_delay_beside_a_zero_that_strays_is_asked_what_it_takes_of_what_is_not_the_zeros():
+    """Nine in eleven parts of what the bias leaves are its own course (half of 30² beside 10²)."""
+    time_s = np.linspace(0.0, 40.0, 4000)
+    slow, fast = 30.0 * np.sin(0.4 * time_s), 10.0 * np.sign(np.sin(9.0 * time_s))
+    data: Any = SimpleNamespace(time_s=time_s, whitened=lambda e: e)
+    base, biased, also = fit(0.0), fit(0.0, "force_bias"), fit(0.0, "force_bias", "force_delay")
+    for left, least, most in ((slow + fast, 0.75, 0.85), (slow, 0.99, 1.0), (fast, 0.0, 0.02)):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(evidence, "errors", lambda *_, left=left: left)
+            also.x = also.structure
+            assert least <= evidence.of_slow_force(data, biased, also, base) <= most
+            assert evidence.of_slow_force(data, base, biased, base) == 0.0
+            assert evidence.of_slow_force(data, fit(0.0, "friction"), also, base) == 0.0
