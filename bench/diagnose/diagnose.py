@@ -398,7 +398,8 @@ def _apart(
 
 
 def _ranking(path: Path) -> list[Alternative]:
-    if not path.rivals:
+    """What each candidate alone takes of what the best takes; none where that is no more than chance."""
+    if not path.rivals or not path.evidence[0].significant:
         return []
     base = path.measures[0].before
     best = path.rivals[0][0].fit.chi2

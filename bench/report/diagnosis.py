@@ -166,12 +166,14 @@ def _held_out(d: Diagnosis) -> str:
 
 def _candidates(d: Diagnosis) -> str:
     svg = plots.candidates(d)
+    if not svg:
+        return f"<p>{markup.text('No cause alone takes more of what the believed model leaves than chance would.')}</p>"
     said = (
         "What each cause alone, refitted together with the pad, takes of the gain of the best. Blue: named above; "
         "orange: not excluded in its place. Faults of the channel (stray, stuck, saturated samples, hum) are found "
         "in the samples themselves and are not in this list."
     )
-    return figure(svg, said) if svg else ""
+    return figure(svg, said)
 
 
 def _remains(d: Diagnosis) -> str:

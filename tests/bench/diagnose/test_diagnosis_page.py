@@ -45,6 +45,11 @@ def test_pages_of_all_verdicts_are_whole(changes):
     check(diagnosis_page(made_up(**changes)))
 
 
+def test_where_no_candidate_gains_there_are_no_shares_of_nothing():
+    assert "than chance would" in diagnosis_page(made_up(ranking=[], causes=[]))
+    assert "than chance would" not in diagnosis_page(made_up())
+
+
 def test_long_data_stay_small():
     d = made_up()
     repeat = 200  # 400 000 samples
