@@ -22,6 +22,8 @@ from .verdict import described
 
 Array = NDArray[np.float64]
 
+HIDDEN = 2.0  # times as many samples stick as show one by one
+UNTOLD = "; most of them cannot be told from readings that are equal by chance, and stay in"
 SEEN = 0.001  # of the samples that repeat: told, whatever they add to the error
 
 
@@ -51,7 +53,9 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
             numbers = {"fraction": Number(share, "1", float(np.sqrt(share * (1 - share) / among)))}
         if id_ == "saturation":
             mask = mask | (flags.bent[prepared.kept] & counted)
-        out.append(_named(id_, effect(id_).forms[0].name, numbers, float(np.sum(error[mask] ** 2)) / n))
+        named = _named(id_, effect(id_).forms[0].name, numbers, float(np.sum(error[mask] ** 2)) / n)
+        hidden = id_ == "stuck_samples" and numbers["fraction"].value > HIDDEN * count / n
+        out.append(replace(named, explanation=named.explanation + UNTOLD) if hidden else named)
     return out
 
 

@@ -49,8 +49,8 @@ def coarse_repeats(force: Array, but: Mask) -> tuple[Mask, float | None]:
         return mask, None
     # what repeats counts with the change that is foretold beside it, whether it repeats or not
     same = np.diff(force) == 0.0
-    first = np.flatnonzero(~(same & np.concatenate([[False], same[:-1]])))[1:-1]
-    length = np.diff(np.append(first, len(change) - 1))
+    begins = np.flatnonzero(~(same & np.concatenate([[False], same[:-1]])))
+    first, length = begins[1:-1], np.diff(begins[1:])
     before, after = change[first - 1], change[first + length]
     others = np.concatenate([[0], np.cumsum(bad)])
     one_way = (before * after > 0) & (others[first + length + 1] == others[first - 1])

@@ -79,8 +79,8 @@ def evidence_of(
     before: Fit, after: Fit, base: Fit, memory: float, samples: float, expected: float, slow: float = 0.0
 ) -> Evidence:
     """What the step from `before` to `after` is worth; `memory`: samples that say the same as one, which χ² does not
-    know of; `expected`: χ² that noise alone leaves; `slow`: share of what is left that is an
-    earlier cause's, of another course.
+    know of; `expected`: χ² that noise alone leaves; `slow`: share of what is left that is an earlier
+    cause's, of another course.
 
     What is left besides, of whatever cause, counts as noise where significance is asked (Fisher's ratio of variances).
     """

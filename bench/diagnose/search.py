@@ -361,12 +361,16 @@ class Search(Sieve):
                 return refit(self.short, without.structure, without.x, ALL, 1e-8)
             for trial in self.ranked(without, only=rivals)[:1]:
                 gained = without.chi2 - trial.fit.chi2
+                shaped = trial
                 if trial.score >= score and gained > NEARLY * (without.chi2 - best.chi2):
                     shaped = self._told(trial)
-                    if shaped is not trial and not told:  # shapes against shapes
-                        best, told = self.recurved(best), True
-                        score = self._to_beat(best)
-                    trial = shaped
+                asked = shaped is not trial or (trial.score < score and unexplained(best.chi2, self.expected) > 0.0)
+                if asked and not told:  # shapes against shapes
+                    best, told = self.recurved(best), True
+                    score = self._to_beat(best)
+                    if shaped is trial and trial.score >= score:
+                        shaped = self._told(trial)
+                trial = shaped
                 if trial.score < score and believable(trial.fit, self.prepared):
                     best, score = trial.fit, self._to_beat(trial.fit)
         return best
