@@ -228,3 +228,32 @@ def test_a_delay_beside_a_zero_that_strays_is_asked_what_it_takes_of_what_is_not
             assert least <= evidence.of_slow_force(data, biased, also, base) <= most
             assert evidence.of_slow_force(data, base, biased, base) == 0.0
             assert evidence.of_slow_force(data, fit(0.0, "friction"), also, base) == 0.0
+
+
+class Exchanging(Told):
+    """A search whose exchange is the real one; without one of its causes a fit leaves 50,000."""
+
+    exchanged = Search.exchanged
+    believed: Any = SimpleNamespace(causes=())
+
+    def _without(self, now: Any, index: int) -> Any:
+        return fit(50e3, *(c.id for k, c in enumerate(now.structure.causes) if k != index))
+
+    def _penalty(self, now: Any) -> float:
+        return 0.0
+
+
+@pytest.mark.parametrize(
+    ("shapes", "after"),
+    [
+        ({8500.0: 2800.0}, ["force_bias", "backlash"]),
+        ({}, ["backlash", "cogging"]),
+        ({8500.0: 2800.0, 5000.0: 1000.0}, ["backlash", "cogging"]),
+    ],
+)
+def test_no_cause_goes_for_another_before_those_beside_it_have_had_their_best_shapes(shapes, after):
+    """Play of the wrong shape leaves what a cogging of many numbers takes in place of the bias."""
+    search = Exchanging({("backlash",): {"cogging": 5000.0}}, None, shapes)
+    path = Path([fit(200e3), fit(56e3, "force_bias"), fit(8500.0, "force_bias", "backlash")])
+    path.tried = [["force_bias", "cogging"], ["backlash"]]
+    assert [c.id for c in search.exchanged(path).structure.causes] == after
