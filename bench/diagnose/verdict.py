@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from .data import Prepared
 from .evidence import CRUMB, RIVAL, tempered, unexplained
 from .held_out import held_out_square
 from .late import LATE
+from .numbers import Cause
 from .path import Measure, Path, Trial
 from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
@@ -19,6 +20,7 @@ from .search import Search
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
 UNSEEN = 0.1  # of the noise power: what no test of structure sees of what is left, and the noise may be as well
+TOLD_SIZE = 0.25  # of a cause's size, that its standard deviation may be for a sure name
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
 
@@ -167,10 +169,22 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
         id_, form, numbers = described(final, own + k)
         effect = final.structure.causes[own + k].effect
         values = {name: number.value for name, number in numbers.items()}
+        most = _of_its_size(final.structure.causes[own + k], numbers)
+        confidence, kind = min(confidence, most), min(kind, most)
         out.append(
             CauseFound(id_, form, numbers, gain, confidence, others, explain(effect, values), effect.check, kind)
         )
     return out
+
+
+def _of_its_size(cause: Cause, numbers: Mapping[str, Number]) -> float:
+    """How sure a name can be at the most whose size these data do not tell: such a shape stands for something else."""
+    size = cause.amplitude
+    if size is None or size.fixed or size.name not in numbers:
+        return 1.0
+    number = numbers[size.name]
+    doubt = number.std / max(abs(number.value), 1e-300) if np.isfinite(number.std) else 1.0
+    return 1.0 if doubt <= TOLD_SIZE else 0.5 * TOLD_SIZE / min(doubt, 1.0)
 
 
 def explain(effect: object, values: dict[str, float]) -> str:

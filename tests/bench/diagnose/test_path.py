@@ -11,8 +11,11 @@ import pytest
 
 from bench.diagnose import evidence, verdict
 from bench.diagnose.evidence import TRACE, Evidence
+from bench.diagnose.numbers import cause_of
 from bench.diagnose.path import Measure, Path
+from bench.diagnose.result import Number
 from bench.diagnose.search import Search
+from sim.effects import effect
 
 module = importlib.import_module("bench.diagnose.search")
 NOISE = 1000.0
@@ -257,3 +260,11 @@ def test_no_cause_goes_for_another_before_those_beside_it_have_had_their_best_sh
     path = Path([fit(200e3), fit(56e3, "force_bias"), fit(8500.0, "force_bias", "backlash")])
     path.tried = [["force_bias", "cogging"], ["backlash"]]
     assert [c.id for c in search.exchanged(path).structure.causes] == after
+
+
+@pytest.mark.parametrize(("std", "most"), [(0.02, 1.0), (0.5, 0.25), (5.0, 0.125), (float("nan"), 0.125)])
+def test_a_name_is_not_surer_than_its_size(std, most):
+    """A mass of 1 kg to within 20 g, 500 g, 5 kg, or not told at all."""
+    inertia = effect("inertia")
+    cause = cause_of(inertia, inertia.forms[0])
+    assert verdict._of_its_size(cause, {"mass": Number(1.0, "kg", std)}) == pytest.approx(most)
