@@ -311,8 +311,8 @@ def _equal_by_chance(force: Array) -> float:
     change = np.abs(np.diff(force))
     least = 1e-9 * float(np.ptp(force))
     sizes, counts = np.unique(np.rint(change[change > least] / max(least, 1e-300)), return_counts=True)
-    if (counts >= FEW_REPEATS).any():  # changes come in steps: those of 0 are as many as of one step either way
-        return 0.5 * float(counts[np.argmax(counts >= FEW_REPEATS)])
+    if counts.max(initial=0) >= FEW_REPEATS:  # changes come in steps: those of 0 are as many as of one step either way
+        return 0.5 * float(counts.max())
     finest = least * float(sizes[0]) if len(sizes) else 0.0
     scatter = 1.4826 * float(np.median(change))
     return len(force) * finest / max(float(np.sqrt(2.0 * np.pi)) * scatter, 1e-300)

@@ -72,6 +72,16 @@ def test_repeats_in_motion_are_told_where_a_coarse_channel_hides_those_at_rest()
         assert (found & ~stuck).sum() <= 0.1 * found.sum()
 
 
+def test_a_fine_scale_with_a_few_values_between_its_steps_repeats_itself_by_chance():
+    """Some readings are means of others: the finest change is none of the scale's."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        force = np.round(5.0 * np.exp(-np.arange(2000) / 400.0) + 0.001 * rng.standard_normal(2000), 4)
+        between = rng.choice(2000, 100, replace=False)
+        force[between] += 0.00005
+        assert not faults(force).stuck.any()
+
+
 def _scored(said: np.ndarray, true: np.ndarray) -> tuple[float, float]:
     """(precision, recall) of samples (n,)."""
     hits = float((said & true).sum())
