@@ -76,7 +76,7 @@ def least_gain(base: Fit, memory: float, samples: float, expected: float, first:
 
 
 def evidence_of(
-    before: Fit, after: Fit, base: Fit, memory: float, samples: float, expected: float, slow: float = 0.0
+    before: Fit, after: Fit, base: Fit, memory: float, samples: float, expected: float, slow: float
 ) -> Evidence:
     """What the step from `before` to `after` is worth; `memory`: samples that say the same as one, which χ² does not
     know of; `expected`: χ² that noise alone leaves; `slow`: share of what is left that is an earlier

@@ -60,15 +60,12 @@ class Path:
         judged)."""
         if id_ in self.compared:
             return self.compared[id_]
-        stages = [
-            (next(t for t in ranked if t.id == id_), ranked, measure)
-            for ranked, measure in zip(self.rivals, self.measures, strict=True)
-            if any(t.id == id_ for t in ranked)
-        ]
-        # one that came in place of another stood near it there, and far behind where it was no cause yet
-        own, ranked, measure = max(stages, key=lambda s: _of_the_best(*s), default=(None, [], None))
-        if own is None or measure is None:
+        turns = zip(self.rivals, self.measures, strict=True)
+        stages = [(own, ranked, measure) for ranked, measure in turns for own in ranked if own.id == id_]
+        if not stages:
             return None
+        # one that came in place of another stood near it there, and far behind where it was no cause yet
+        own, ranked, measure = max(stages, key=lambda stage: _of_the_best(*stage))
         return own, [t for t in ranked if t.id != id_], measure
 
 

@@ -167,12 +167,14 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
     for k, gain in enumerate(gains):
         others, confidence, kind = sureness(path, named[k], named)
         id_, form, numbers = described(final, own + k)
-        effect = final.structure.causes[own + k].effect
+        cause = final.structure.causes[own + k]
         values = {name: number.value for name, number in numbers.items()}
-        most = _of_its_size(final.structure.causes[own + k], numbers)
+        most = _of_its_size(cause, numbers)
         confidence, kind = min(confidence, most), min(kind, most)
         out.append(
-            CauseFound(id_, form, numbers, gain, confidence, others, explain(effect, values), effect.check, kind)
+            CauseFound(
+                id_, form, numbers, gain, confidence, others, explain(cause.effect, values), cause.effect.check, kind
+            )
         )
     return out
 
