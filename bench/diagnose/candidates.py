@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from bench.identify.motion import holds
 from sim.effects import all_effects
 from sim.effects.base import Effect, Form, Parameter
 from sim.elastic import ElasticLaw, NoPad
@@ -35,7 +34,6 @@ LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
 BENDS_AT = (0.08, 0.14, 0.2, 0.28, 0.38, 0.5, 0.7)  # of the depth reached
 MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
-LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich
 FRESH = 0.9  # of the depth reached, beyond which a softening pad must go for the first time in the run
 LONGEST_REPORTED = 0.7  # of the depth, for errors of the position: longer ones are another elastic law
 
@@ -123,31 +121,6 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     default = min(max(default, lower), upper)
     typical = min(max(p.typical, lower), upper)
     return replace(p, lower=lower, upper=upper, starts=starts, default=default, typical=typical)
-
-
-def is_rich(data: Data) -> bool:
-    """Whether a measurement holds several depths, or passes over its depth several times."""
-    counted = data.weight > 0
-    x = data.position_mm
-    span = float(np.ptp(x[counted])) if counted.any() else 0.0
-    if span <= 0.0:
-        return False
-    levels: list[float] = []
-    for s in holds(data.time_s, x):
-        level = float(np.mean(x[s]))
-        if level > 0.05 * span and all(abs(level - other) > 0.05 * span for other in levels):
-            levels.append(level)
-    if len(levels) >= LEVELS:
-        return True
-    passes, way, end = 0, 0, float(x[0])
-    for value in x[:: max(len(x) // 5000, 1)].tolist():
-        if way >= 0 and value > end or way <= 0 and value < end:
-            if way == 0 and abs(value - end) > 0.5 * span:
-                way, passes = (1 if value > end else -1), passes + 1
-            end = value if way else end
-        elif abs(value - end) > 0.5 * span:
-            way, passes, end = -way, passes + 1, value
-    return passes >= PASSES
 
 
 def forms(structure: Structure, in_air: bool, reach: Reach, also_unsought: bool = False) -> list[tuple[Effect, Form]]:

@@ -14,6 +14,7 @@ from bench import identify
 from bench.errors import InputError
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
+from sim.effects import all_effects
 from sim.model import Model
 from sim.pad import Pad
 
@@ -359,6 +360,7 @@ def _concluded(
         notes=list(m.notes),
         remainders=tests,
         name=m.name,
+        seen_once=not search.reach.rich and any(all_effects()[c.id].of_motion for c in causes),
         time_s=full.time_s[at],
         position_mm=full.position_mm[at],
         force_N=raw.force_N[at],

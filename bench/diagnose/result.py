@@ -113,6 +113,8 @@ class Diagnosis:
     notes: list[str] = field(default_factory=list)
     remainders: list[Remainder] = field(default_factory=list)
     name: str = ""
+    seen_once: bool = False
+    """Whether the depth was passed so seldom that no name of a cause which acts with the motion is sure."""
     held_out_interval: tuple[float, float] = (math.nan, math.nan)
     """95 % interval of the held-out gain E_n/E_0 (share left), over the blocks."""
     time_s: Array = field(default_factory=lambda: np.zeros(0))

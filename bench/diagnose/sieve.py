@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from sim import effects
 from sim.effects import Effect, Form
 
-from .candidates import Reach, Signatures, Start, forms, is_rich, starts
+from .candidates import Reach, Signatures, Start, forms, starts
 from .dashpot import instead_of_a_mode
 from .data import Data, Prepared
 from .evidence import penalty, unexplained
@@ -22,6 +22,7 @@ from .path import Trial
 from .refit import Fit, extended, force_at, jacobian, refit
 from .ripple import ripples
 from .spectrum import one_more_mode
+from .way import is_rich
 
 Array = NDArray[np.float64]
 

@@ -7,6 +7,7 @@ import math
 from sim.effects import all_effects
 
 from .result import Alternative, CauseFound, Diagnosis
+from .way import LEVELS, PASSES, TOLD_ONCE
 
 NAMES = {
     "adhesion": "adhesion",
@@ -123,6 +124,7 @@ def lines(d: Diagnosis) -> list[str]:
         out.append(f"  {percent(d.flagged_fraction)} of the force samples are flagged and left out")
     if d.verdict != "consistent":
         out += [f"  {sentence}" for sentence in remains(d)]
+    out += [f"  {sentence}" for sentence in warnings(d)]
     if d.verdict == "unexplained":
         out.append(
             "  no cause of the catalogue (docs/effects.md) does this: look at what remains before trusting the model"
@@ -136,6 +138,17 @@ def remains(d: Diagnosis, most: int = REMAINS) -> list[str]:
     """What is left has structure: in sentences."""
     told = [r for r in d.remainders if r.passed]
     return [f"what is left {r.sentence} ({percent(r.share)} of its power)" for r in told[:most]]
+
+
+def warnings(d: Diagnosis) -> list[str]:
+    """What makes the names doubtful, and the cure."""
+    if not d.seen_once:
+        return []
+    return [
+        f"the run passes its depth fewer than {PASSES} times and holds at fewer than {LEVELS} depths, so a cause that"
+        " acts with the motion cannot be told from a pad that is stranger than its law: no such name is more than"
+        f" {percent(TOLD_ONCE)} sure (press and return more often, or hold at more depths)"
+    ]
 
 
 def sure(cause: CauseFound) -> str:

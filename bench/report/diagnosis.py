@@ -59,6 +59,7 @@ def card(d: Diagnosis, heading: str = "", *, notes: bool = True, remark: str = "
     tone = "fair" if d.verdict == "unexplained" and d.causes else TONES.get(d.verdict, "plain")
     said = [_sentence(cause.explanation) for cause in d.causes]
     said.append(" ".join(_sentence(words_) for words_ in words.remains(d)) if d.verdict != "consistent" else "")
+    said += [_sentence(sentence) for sentence in words.warnings(d)]
     if d.verdict == "unexplained":
         said.append("No cause of the catalogue does this: look at what remains before trusting the model.")
     paragraphs = "".join(f"<p>{markup.text(sentence)}</p>" for sentence in said if sentence)

@@ -127,6 +127,9 @@ class Effect:
     """What to look at on the bench."""
     reference: str = ""
     """Where the physics stands in the literature."""
+    of_motion: bool = True
+    """Whether it acts with depth or speed. One press and one hold show that once, and a pad that is stranger than its
+    law does the same; what runs in time or stands at a level is told by them as well as by a longer run."""
 
     def explanation(self, values: Mapping[str, float]) -> str:
         """`says` with numbers in it; `what` where the effect has no such sentence."""

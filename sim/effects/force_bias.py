@@ -86,6 +86,7 @@ EFFECT = Effect(
     says="the force is off by {bias:.4g} N, in free air too",
     check="tare in free air, with probe and cable as they are in the run",
     reference="OIML R 60, Metrological regulation for load cells",
+    of_motion=False,
     forms=(
         Form(name="constant", what="the same at all times", parameters=(_BIAS,), blocks={"sensor": bias}),
         Form(

@@ -103,6 +103,7 @@ EFFECT = Effect(
     says="the force drifts by {rate:.4g} N per second at the start",
     check="let the cell warm up, and keep some free air before and after the run",
     reference="OIML R 60, Metrological regulation for load cells",
+    of_motion=False,
     forms=(
         Form(name="linear", what="steady", parameters=(_RATE,), blocks={"sensor": linear}, state=(0.0,)),
         Form(

@@ -161,6 +161,7 @@ EFFECT = Effect(
     says="the force hums with {amplitude:.4g} N at {frequency:.5g} Hz",
     check="look at shield and ground of the cell's cable; set the amplifier's notch or average over whole periods",
     reference="Ott, Noise Reduction Techniques in Electronic Systems, 2nd ed., 1988",
+    of_motion=False,
     forms=(
         Form(
             name="sine",

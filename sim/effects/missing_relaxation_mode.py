@@ -148,6 +148,7 @@ EFFECT = Effect(
     says="a share of {share:.4g} of the force relaxes at a rate of {rate:.4g} per second, which the model lacks",
     check="fit with one more mode; hold longer for slow ones, ramp faster for fast ones",
     reference="Williams, Watts, Trans. Faraday Soc. 66, 1970, 80-85; Fung, Biomechanics, 2nd ed., 1993",
+    of_motion=False,
     forms=(
         Form(name="exponential", what="one more mode", parameters=(_SHARE, _RATE), amend=_exponential),
         Form(

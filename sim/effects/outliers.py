@@ -70,6 +70,7 @@ EFFECT = Effect(
     says="{fraction:.3g} of the force samples are spikes",
     check="look at cable, plugs and checksum errors; such samples are left out",
     reference="Huber, Robust Statistics, 1981",
+    of_motion=False,
     forms=(
         Form(
             name="heavy",

@@ -254,6 +254,7 @@ EFFECT = Effect(
     says="the force path rings at {frequency:.4g} Hz with a damping ratio of {damping_ratio:.3g}",
     check="tap the probe in free air and look at the ringing; a lighter probe or a stiffer mount raises its frequency",
     reference="Thomson, Theory of Vibration with Applications, 4th ed., 1993",
+    of_motion=False,
     forms=(
         Form(
             name="low_pass",

@@ -65,6 +65,7 @@ EFFECT = Effect(
     says="{fraction:.3g} of the force samples repeat an old value",
     check="poll the load cell no faster than it converts; look for lost frames; such samples are left out",
     reference="Isermann, Fault-Diagnosis Systems, 2006",
+    of_motion=False,
     forms=(
         Form(
             name="runs",

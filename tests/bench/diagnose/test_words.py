@@ -32,6 +32,12 @@ def test_what_how_big_how_sure_and_what_to_check():
     assert "goes with the speed" in said and "course of the run" not in said, "only what passed is told"
 
 
+def test_where_depths_are_met_once_the_doubt_and_the_cure_are_told():
+    assert "pass" not in "\n".join(lines(made_up()))
+    said = "\n".join(lines(made_up(seen_once=True)))
+    assert "no such name is more than 50 % sure" in said and "hold at more depths" in said
+
+
 def test_excluded_rivals_are_said_to_be_excluded_and_only_near_ones():
     d = made_up()
     near = replace(d.causes[0].alternatives[0], excluded=True)
