@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
+AS_LATE = 0.9  # of the best gain: what makes the force late and takes so much brings its look-alikes in
 FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the least
 HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
 AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
@@ -158,8 +159,10 @@ class Sieve:
         return [self._carried(again, ALL)] if again is not None and again.score < trial.score else []
 
     def _late_alike(self, fit: Fit, ranked: list[Trial], family: dict[str, list[Form]]) -> list[Trial]:
-        """Where a delay, a lag or a stiff resonance fits best: the others again, from where they are as late as it."""
-        best = ranked[0] if ranked else None
+        """Where a delay, a lag or a stiff resonance fits as well as any: the others again, from where they are as late as
+        it. A relaxation mode can have taken their place, so that no signature shows them."""
+        enough = AS_LATE * (fit.chi2 - ranked[0].fit.chi2) if ranked else 0.0
+        best = next((t for t in ranked if t.id in LATE and fit.chi2 - t.fit.chi2 >= enough), None)
         late_s = 0.0 if best is None else lateness_s(best.id, best.fit.structure.values(best.fit.x)[-1])
         if best is None or late_s <= 0.0:
             return ranked
@@ -174,7 +177,8 @@ class Sieve:
             tried = [t for t in (self._joined(fit, cause, MORE, None) for cause in late) if t is not None]
             if tried:
                 again = self._carried(min(tried, key=lambda t: t.score), ALL)
-                out[id_] = min([again, *([out[id_]] if id_ in out else [])], key=lambda t: t.score)
+                others = [*self._relaxing_as(ranked[0], again), *([out[id_]] if id_ in out else [])]
+                out[id_] = min([again, *others], key=lambda t: t.score)
         return list(out.values())
 
     def _promising(self, by_id: dict[str, list[Start]], least: float) -> list[str]:

@@ -23,6 +23,8 @@
 - `smooth`: −pull_off · q e^(1−q) with q = gap/z, the same on the way in and out: nothing at touch, the most at z, then
   down again (X.-P. Xu, A. Needleman, Numerical simulations of fast crack growth in brittle solids, J. Mech. Phys.
   Solids 42, 1994, 1397–1434). z = range/3.146, as q e^(1−q) is 1/e there.
+- `even`: `pull_off` over all of the range, on both ways, and nothing beyond (D. S. Dugdale, J. Mech. Phys. Solids 8,
+  1960, 100–104; D. Maugis, J. Colloid Interface Sci. 150, 1992, 243–269), rounded over a twentieth of it.
 
 `range` is the gap at which the pull has fallen to 1/e where it ends nowhere, and where it ends otherwise.
 
@@ -38,6 +40,7 @@ from sim.jit import State, block
 
 _ROOT = math.expm1(0.5)
 _FALLEN = 3.1461932206205825  # q e^(1 − q) = 1/e, beyond the crest
+_ROUNDED = 0.05  # of the range, over which `even` ends
 _CREEP_MM_S = 0.1
 """Speed of opening below which `quick` falls no further."""
 _NEAR = 0.02
@@ -129,6 +132,12 @@ def smooth(dt: float, gap: float, state: State, p: State) -> float:
     """Force in N; p = (pull_off, range)."""
     q = _FALLEN * gap / p[1]
     return float(-p[0] * q * math.exp(1.0 - q))
+
+
+@block
+def even(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range)."""
+    return -p[0] * 0.5 * (1.0 - math.tanh((gap / p[1] - 1.0) / _ROUNDED))
 
 
 _PULL_OFF = Parameter(
@@ -235,6 +244,13 @@ EFFECT = Effect(
             parameters=(_PULL_OFF, _RANGE),
             sought=False,
             blocks={"gap": smooth},
+        ),
+        Form(
+            name="even",
+            what="the same pull over all of the range",
+            parameters=(_PULL_OFF, _RANGE),
+            sought=False,
+            blocks={"gap": even},
         ),
     ),
 )

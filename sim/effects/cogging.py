@@ -13,6 +13,8 @@
 - `edged`: Σ r^(n−1) sin n θ, all harmonics, as of edges that are rounded over some of the period: sin θ over
   1 − 2 r cos θ + r²; `amplitude` is that of the first.
 - `warming`: the sine fades or grows in time, as magnets weaken with warmth: amplitude · (1 + growth (t − at_time)).
+- `creeping`: phase + creep · ∫|dy|, all the way there has been since the first sample, to and fro: a belt that creeps
+  on its pulley (J. N. Fawcett, Chain and belt drives: a review, Shock Vib. Digest 13(5), 1981, 5–12).
 
 Reference: J. F. Gieras, Z. J. Piech, B. Z. Tomczuk, Linear Synchronous Motors: Transportation and Automation Systems,
 2nd ed., CRC Press, 2012 (cogging and detent force).
@@ -84,6 +86,17 @@ def warming(dt: float, y: float, state: State, p: State) -> float:
     state[0] += dt
     size = max(1.0 + p[3] * (state[0] - p[4]), 0.0)
     return p[0] * size * math.sin(2.0 * math.pi * y / p[1] + p[2])
+
+
+@block
+def creeping(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, creep); state: started, place before, way."""
+    if state[0] == 0.0:
+        state[0] = 1.0
+        state[1] = y
+    state[2] += abs(y - state[1])
+    state[1] = y
+    return p[0] * math.sin(2.0 * math.pi * y / p[1] + p[2] + p[3] * state[2])
 
 
 def _of_the_first_harmonic(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -191,6 +204,19 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": edged},
+        ),
+        Form(
+            name="creeping",
+            what="a sine whose phase goes with the way",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("creep", "rad/mm", -0.5, 0.5, 0.0, "phase for each mm of way", starts=(-0.01, 0.01)),
+            ),
+            sought=False,
+            blocks={"probe": creeping},
+            state=(0.0, 0.0, 0.0),
         ),
         Form(
             name="warming",

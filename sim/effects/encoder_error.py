@@ -9,6 +9,8 @@
 - `leaning`: the sine grows or fades with a power of the depth, as the bracket of a head bends under the load:
   amplitude · (1 + growth ((true/reach)^power − ½)), within 0 and twice the amplitude, which is that at
   half of the load.
+- `stitched`: Σ r^(n−1) sin n θ/n, a saw tooth with rounded edges: fields of a scale that are each a little too long or
+  too short, and begin anew. It is atan(r sin θ/(1 − r cos θ))/r; `amplitude` is that of the first harmonic.
 
 A reported position must rise with the true one; an error so steep that it would not is taken as the steepest that does.
 """
@@ -23,6 +25,7 @@ from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC
 from sim.jit import State, block
 
 _STEEPEST = 0.9
+_BLUNT = 1e-6  # a sharpness below is a sine
 
 
 @block
@@ -51,6 +54,21 @@ def leaning(dt: float, x: float, state: State, p: State) -> float:
     loaded = (max(x, 0.0) / p[5]) ** p[4]
     size = min(max(1.0 + p[3] * (loaded - 0.5), 0.0), 2.0)
     return float(x + p[0] * size * math.sin(p[1] * x + p[2]))
+
+
+@block
+def stitched(dt: float, x: float, state: State, p: State) -> float:
+    """Reported position; p = (amplitude, wave number, phase, sharpness)."""
+    angle = p[1] * x + p[2]
+    return x + p[0] * math.atan2(p[3] * math.sin(angle), 1.0 - p[3] * math.cos(angle)) / p[3]
+
+
+def _packed_stitched(values: Mapping[str, float]) -> tuple[float, ...]:
+    wave_number = 2.0 * math.pi / values["period"]
+    sharpness = values["sharpness"]
+    sharpness = sharpness if abs(sharpness) > _BLUNT else math.copysign(_BLUNT, sharpness)
+    amplitude = min(values["amplitude"], _STEEPEST * (1.0 - abs(sharpness)) / wave_number)
+    return (amplitude, wave_number, values["phase"], sharpness)
 
 
 def _packed_leaning(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -123,6 +141,18 @@ EFFECT = Effect(
             parameters=(_AMPLITUDE, _PERIOD, PHASE, *GROWTH),
             blocks={"report": fading},
             pack=_packed_fading,
+        ),
+        Form(
+            name="stitched",
+            what="a saw tooth with rounded edges",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("sharpness", "1", -0.95, 0.95, 0.6, "each harmonic over the one before", starts=(-0.6, 0.6)),
+            ),
+            blocks={"report": stitched},
+            pack=_packed_stitched,
         ),
         Form(
             name="leaning",

@@ -10,6 +10,8 @@ From a tare while something touched, a cable that pulls, a probe changed after t
   a weak spring. It hangs free further than half the reach beyond either end.
 - `returning`: bias · (1 + share (G/at_force − ½)), G the force of the last seconds, by a first order: cells are slow to
   come back to zero after a load, and come back the later, the longer it lasted.
+- `in_motion`: bias · (1 + share m), m = 1 while the probe moves and 0 while it rests: a drive's carrier that an
+  amplifier rectifies (IEC 61326-2-3, Electromagnetic compatibility of transducers).
 
 The share is small: a zero that moves by more of itself than that drifts. A drift begins at zero; a bias is there from
 the first sample on.
@@ -27,6 +29,7 @@ from sim.effects.linear import first_order
 from sim.jit import State, block
 
 _MOST = 0.3  # of the bias, by which it may change
+_SLOW_MM_S = 0.02  # at which a motion counts half
 
 
 @block
@@ -61,6 +64,19 @@ def returning(dt: float, force: float, state: State, p: State) -> float:
     state[1] = first_order(dt, state[1], state[0], force, p[2])
     state[0] = force
     return force + p[0] * (1.0 + p[1] * (min(max(state[1] / p[3], -0.5), 1.5) - 0.5))
+
+
+@block
+def in_motion(dt: float, y: float, state: State, p: State) -> float:
+    """Force at the probe; p = (bias, share). State: started, place before, of which it moves."""
+    if state[0] == 0.0:
+        state[0] = 1.0
+        state[1] = y
+    if dt > 0.0:
+        speed = abs(y - state[1]) / dt
+        state[2] = speed / (speed + _SLOW_MM_S)
+        state[1] = y
+    return p[0] * (1.0 + p[1] * state[2])
 
 
 _BIAS = Parameter(
@@ -137,6 +153,14 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": along},
+        ),
+        Form(
+            name="in_motion",
+            what="a little more or less while the motor moves",
+            parameters=(_BIAS, _share("what there is more of it in motion")),
+            sought=False,
+            blocks={"probe": in_motion},
+            state=(0.0, 0.0, 0.0),
         ),
     ),
 )

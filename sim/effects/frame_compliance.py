@@ -21,6 +21,9 @@ of K. The force used is the one at the cell, solved within the step (sim/kernel.
 - `creeping`: C ((1 − s) F + s G)/(1 − s/2), where G follows F with a time constant: parts of plastic or glue creep. C
   is the middle of at once and at last (W. N. Findley, J. S. Lai, K. Onaran, Creep and Relaxation of Nonlinear
   Viscoelastic Materials, North-Holland, 1976). Exact for a force that is linear between samples.
+- `jamming`: C F (1 − μ) as the load grows and C F (1 + μ) as it goes, stuck between the two: a taper or a clamp whose
+  faces rub under the load that they bear (J. E. Shigley, C. R. Mischke, Mechanical Engineering Design, McGraw-Hill,
+  on wedges that lock themselves).
 - `damped`: d + τ d' = C F, all of it late: a mount of rubber or a damped column, a spring with a dashpot beside it
   (E. I. Rivin, Passive Vibration Isolation, ASME Press, 2003, on Kelvin and Voigt's model of rubber). Exact, too.
 
@@ -72,6 +75,14 @@ def slipping(dt: float, force: float, state: State, p: State) -> float:
     """Deflection in mm; p = (compliance, share, slip_force); state: the force that the joints have followed."""
     state[0] = min(max(state[0], force - p[2]), force + p[2])
     return p[0] * ((1.0 - p[1]) * force + p[1] * state[0])
+
+
+@block
+def jamming(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection in mm; p = (compliance, rubs); state: the deflection before."""
+    middle, half = p[0] * force, p[0] * p[1] * abs(force)
+    state[0] = min(max(state[0], middle - half), middle + half)
+    return state[0]
 
 
 @block
@@ -172,6 +183,16 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"frame": slipping},
+            state=(0.0,),
+        ),
+        Form(
+            name="jamming",
+            what="less as the load grows than as it goes, stuck between",
+            parameters=(
+                _compliance("deflection per newton, the mean of both ways"),
+                Parameter("rubs", "1", 0.0, 0.6, 0.15, "what friction adds or takes, over the load", starts=(0.15,)),
+            ),
+            blocks={"frame": jamming},
             state=(0.0,),
         ),
         Form(

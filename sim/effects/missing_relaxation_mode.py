@@ -17,6 +17,8 @@ enough, the believed modes give way too, in proportion: c_0 is then 0.
 - `consolidation`: water that is pressed out of a layer, 8/π² Σ e^(−(2k+1)² rate t)/(2k+1)²: four fifths go at `rate`
   itself (K. Terzaghi, Theoretical Soil Mechanics, Wiley, 1943; M. A. Biot, J. Appl. Phys. 12, 1941, 155–164). Ten
   modes, the last of which takes what is left.
+- `sphere`: what leaves a sphere by diffusion, 6/π² Σ e^(−n² rate t)/n², so that three fifths go at `rate` itself (J.
+  Crank, The Mathematics of Diffusion, 2nd ed., Oxford, 1975). Ten modes, the last of which takes what is left.
 - `gel`: water that leaves a gel under a sphere, 0.491 e^(−0.908 √s) + 0.509 e^(−1.679 s), 1/e of it left at 1/rate
   (Y. Z. Hu, X. Zhao, J. J. Vlassak, Z. Suo, Using indentation to characterize the poroelasticity of gels, Appl. Phys.
   Lett. 96, 2010, 121904): a stretched exponential and one mode.
@@ -122,6 +124,13 @@ def _consolidation(pad: Pad, values: Mapping[str, float]) -> Pad:
     return _with_modes(pad, shares, [float(values["rate"] * k) for k in odd**2])
 
 
+def _sphere(pad: Pad, values: Mapping[str, float]) -> Pad:
+    n = 1.0 + np.arange(NODES)
+    weights = 6.0 / (math.pi * n) ** 2
+    weights[-1] += 1.0 - weights.sum()
+    return _with_modes(pad, [float(values["share"] * w) for w in weights], [float(values["rate"] * k) for k in n**2])
+
+
 def _gel(pad: Pad, values: Mapping[str, float]) -> Pad:
     weights, rates = _stretched_rates(0.5)
     shares = [values["share"] * _OF_A_ROOT * w for w in weights] + [values["share"] * (1.0 - _OF_A_ROOT)]
@@ -199,6 +208,12 @@ EFFECT = Effect(
             parameters=(_SHARE, _RATE),
             sought=False,
             amend=_consolidation,
+        ),
+        Form(
+            name="sphere",
+            what="what leaves a sphere by diffusion",
+            parameters=(_SHARE, _RATE),
+            amend=_sphere,
         ),
         Form(
             name="gel",

@@ -238,3 +238,60 @@ def test_an_encoder_whose_head_leans_under_load() -> None:
     reported = np.array([block(0.0, here, np.zeros(1), vector) for here in x])
     size = 1.0 + 0.6 * ((np.maximum(x, 0.0) / 2.0) ** 2 - 0.5)
     assert_allclose(reported - x, 0.01 * size * np.sin(2 * math.pi * x / 0.8 + 0.3), atol=1e-12)
+
+
+def test_a_taper_that_jams() -> None:
+    """A stiff spring against it: the load goes up to 4 N, back to 1 N and on to 2 N."""
+    jams = active("frame_compliance", "jamming", compliance=0.01, rubs=0.2)
+    load = np.concatenate([np.linspace(0.0, 4.0, 41), np.linspace(4.0, 1.0, 31)[1:], np.linspace(1.0, 2.0, 11)[1:]])
+    block, state = jams.form.blocks["frame"], np.zeros(1)
+    gives = np.array([block(0.1, f, state, np.array([0.01, 0.2])) for f in load])
+    out = 0.01 * np.minimum(4.0 * 0.8, load[41:71] * 1.2)
+    assert_allclose(gives, np.concatenate([0.01 * 0.8 * load[:41], out, np.maximum(out[-1], 0.01 * 0.8 * load[71:])]))
+    force = simulate(LINEAR, [jams], np.arange(81.0), ramp(1.0, 41))
+    assert_allclose(force[:41], K / (1.0 + 0.8 * 0.01 * K) * np.linspace(0.0, 1.0, 41), rtol=1e-6, atol=1e-9)
+    assert_allclose(force[60:], K / (1.0 + 1.2 * 0.01 * K) * np.linspace(0.5, 0.0, 21), rtol=1e-6, atol=1e-9)
+
+
+def test_a_scale_of_fields_too_long_is_off_by_a_saw_tooth() -> None:
+    x = np.arange(1000) / 1000 * 2.0
+    form = effect("encoder_error").form("stitched")
+    for sharpness in (0.6, -0.6, 0.0):
+        numbers = {"amplitude": 0.01, "period": 2.0, "phase": 0.0, "sharpness": sharpness}
+        block, vector = form.blocks["report"], np.array(form.vector(numbers))
+        off = np.array([block(0.0, here, np.zeros(1), vector) for here in x]) - x
+        harmonics = -np.fft.rfft(off).imag[1:6] / 500
+        assert_allclose(harmonics, 0.01 * sharpness ** np.arange(5.0) / np.arange(1, 6), atol=1e-8)
+
+
+def test_a_belt_creeps_with_all_the_way_there_has_been() -> None:
+    x = ramp(3.0, 301)
+    creeps = active("cogging", "creeping", amplitude=0.2, period=2.0, phase=0.3, creep=-0.1)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(x)))])
+    wanted = 0.2 * np.sin(math.pi * x + 0.3 - 0.1 * way)
+    assert_allclose(simulate(AIR, [creeps], np.arange(float(x.size)), x), wanted, atol=1e-12)
+
+
+def test_a_bias_of_a_drive_that_moves() -> None:
+    t = np.arange(0.0, 6.0, 0.01)
+    x = np.interp(t, [0.0, 1.0, 2.0, 4.0, 4.5, 6.0], [0.0, 0.0, 2.0, 2.0, -3.0, -3.0])
+    bias = simulate(AIR, [active("force_bias", "in_motion", bias=-0.1, share=0.2)], t, x)
+    assert_allclose(np.interp([0.5, 1.5, 3.0, 4.25, 5.5], t, bias), [-0.1, -0.12, -0.1, -0.12, -0.1], rtol=5e-3)
+
+
+def test_what_leaves_a_sphere() -> None:
+    pad = Pad(Exponential(K, 0.0), Relaxation(), unilateral=True)
+    t = np.linspace(0.0, 4.0, 401)
+    force = simulate(pad, [active("missing_relaxation_mode", "sphere", share=0.4, rate=0.5)], t, np.full(t.size, 1.0))
+    n = np.arange(1.0, 2001.0)
+    inside = np.array([6.0 / np.pi**2 * np.sum(np.exp(-(n**2) * 0.5 * s) / n**2) for s in t])
+    assert_allclose(force[5:], K * (0.6 + 0.4 * inside[5:]), rtol=2e-3)
+    assert force[0] == K
+
+
+def test_a_pull_that_is_the_same_up_to_its_range() -> None:
+    pulls = active("adhesion", "even", pull_off=0.2, range=0.5)
+    x = np.concatenate([-np.linspace(0.0, 1.0, 11), -np.linspace(1.0, 0.0, 11)])
+    force = simulate(LINEAR, [pulls], np.arange(22.0), x)
+    away = np.round(-x, 6)
+    assert_allclose(force, np.where(away < 0.5, -0.2, np.where(away > 0.5, 0.0, -0.1)), atol=2e-4)
