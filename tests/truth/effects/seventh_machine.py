@@ -1,4 +1,4 @@
-"""The judge's shapes of what lies between the motor and the pad.
+"""The seventh shapes of what lies between the motor and the pad.
 
 Sources: rods that are not quite straight (Timoshenko and Gere, Theory of Elastic Stability) and tapers, whose friction
 goes with their load (Wahl, Mechanical Springs, as of ring springs); two meshes with a shaft between them (Nordin and
@@ -19,12 +19,12 @@ import numpy as np
 from numba import njit
 
 from ..laws import Law, _Tabulated
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import second_order
 from .third_machine import _gms, _sliding, _worn
 
 
-@judge_shapes("frame_compliance", "bowed_rod", "taper")
+@more_shapes("frame_compliance", "bowed_rod", "taper")
 def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     """A rod that is bowed shortens by (1 − F/P)^{−2} − 1, beside what is linear; or a taper that jams.
 
@@ -57,7 +57,7 @@ def _oiled(x, h, length_mm, tau_s):
     return out
 
 
-@judge_shapes("backlash", "two_meshes", "squeezed_out")
+@more_shapes("backlash", "two_meshes", "squeezed_out")
 def backlash(build: Build, shape: str, size: float) -> dict[str, float]:
     """Two plays with a shaft between them, which winds up before the second opens; or a film that wants motion.
 
@@ -104,7 +104,7 @@ class Coned(_Tabulated):
         return self.law.model(depth_mm)
 
 
-@judge_shapes("contact_offset", "coned")
+@more_shapes("contact_offset", "coned")
 def contact_offset(build: Build, shape: str, size: float) -> dict[str, float]:
     """The surface lies elsewhere, and the probe's face is a cone of up to 25 µm; stated is that of its mean height."""
     offset = float(build.rng.choice([-1.0, 1.0])) * 0.05 * size * spread(build.rng, 0.7, 1.4)
@@ -121,7 +121,7 @@ def _power_elements(power: float, count: int = 20) -> tuple[np.ndarray, np.ndarr
     return at[1:], -np.diff(stiffness) * at[1:]
 
 
-@judge_shapes("friction", "rolling", "comes_late", "yield_stress")
+@more_shapes("friction", "rolling", "comes_late", "yield_stress")
 def friction(build: Build, shape: str, size: float) -> dict[str, float]:
     """Balls that roll before they slide; a fall with speed that comes late; or a grease that yields and then flows.
 
@@ -152,7 +152,7 @@ def friction(build: Build, shape: str, size: float) -> dict[str, float]:
 _ARM = ((0.613, 1.0), (0.188, 6.267), (0.065, 17.55))
 
 
-@judge_shapes("inertia", "sheet_cover", "arm")
+@more_shapes("inertia", "sheet_cover", "arm")
 def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     """A cover whose sheets are taken along one by one, and left behind on the way back; or an arm that swings.
 
@@ -181,7 +181,7 @@ def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"mass": mass}
 
 
-@judge_shapes("cogging", "armature_reaction", "belt_creeps")
+@more_shapes("cogging", "armature_reaction", "belt_creeps")
 def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     """The thrust shifts the field, and the ripple's phase with it; or a pulley's, on which the belt creeps.
 
@@ -205,7 +205,7 @@ def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "period": period}
 
 
-@judge_shapes("encoder_error", "stitched", "offsets_drift")
+@more_shapes("encoder_error", "stitched", "offsets_drift")
 def encoder_error(build: Build, shape: str, size: float) -> dict[str, float]:
     """A scale whose fields are written a little too long or short, and begin anew; or offsets of sine and cosine.
 

@@ -1,9 +1,9 @@
-"""The judge's shapes of the pad's own effects against closed forms."""
+"""The seventh shapes of the pad's own effects against closed forms."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_pad import Kondner, VanWyk, _by_stroke, pair_rates, permeability, sphere_rates
+from .effects.seventh_pad import Kondner, VanWyk, _by_stroke, pair_rates, permeability, sphere_rates
 from .laws import Power
 from .motion import Path
 from .pad import Pad
@@ -157,7 +157,7 @@ def test_spectra_of_relaxation():
     assert left[0] < 1e-12 and best / best[0] == pytest.approx(1 / np.array([1.0, 9.0, 25.0, 49.0]), rel=1e-3)
 
 
-@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "seventh"))
 def test_what_is_added_has_its_share(shape):
     pad = Pad(Power(3.0, 0.0), (0.3,), (50.0,))
     fine, told, build = hidden("missing_relaxation_mode", shape, pad=pad, motion=Path(2.0).hold(60.0).motion())
@@ -170,7 +170,7 @@ def test_what_is_added_has_its_share(shape):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("shape", shapes_of("depth_dependent_relaxation", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("depth_dependent_relaxation", "seventh"))
 def test_rates_by_depth(shape, seed):
     depths, rates = np.array([0.05, 0.5, 1.0, 1.5, 2.0]), []
     for depth in depths:
@@ -193,7 +193,7 @@ def test_rates_by_depth(shape, seed):
     assert permeability(0.2, 0.7) == pytest.approx((0.625**3 / 0.375**2) / (0.7**3 / 0.3**2))
 
 
-@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "seventh"))
 def test_damping(shape):
     speeds, parts = np.array([2.0, 5.0, 20.0, 40.0, 80.0]), []
     for speed in speeds:

@@ -1,12 +1,12 @@
-"""The judge's shapes from the cell to the sample, and of the channel's faults, against closed forms."""
+"""The seventh shapes from the cell to the sample, and of the channel's faults, against closed forms."""
 
 import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_channel import swapped
-from .effects.judge_signal import _slewed, echoes, fractional, pulled
 from .effects.registry import SATURATION, Samples
+from .effects.seventh_channel import swapped
+from .effects.seventh_signal import _slewed, echoes, fractional, pulled
 from .motion import Path
 from .sets import shapes_of
 from .test_truth_effects import SHORT, disturbed, hidden
@@ -204,7 +204,7 @@ def test_bytes_in_the_wrong_order():
     assert read / unit == pytest.approx([0, 256, 1, 0x3412, -1, 255])
 
 
-@pytest.mark.parametrize("shape", shapes_of("outliers", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("outliers", "seventh"))
 def test_outliers(shape):
     case = draw_case(2, ("outliers",), 1.0, shape, **MANY)
     truth, hit = case.truth, case.truth.flags["outlier"]
@@ -222,7 +222,7 @@ def test_outliers(shape):
         assert np.max(np.abs(case.force_N)) <= 50.01 and np.std(np.diff(where)) > 0.5 * np.mean(np.diff(where))
 
 
-@pytest.mark.parametrize("shape", shapes_of("stuck_samples", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("stuck_samples", "seventh"))
 def test_stuck_samples(shape):
     case = draw_case(2, ("stuck_samples",), 1.5, shape, **MANY)
     stuck = case.truth.flags["stuck"]

@@ -1,4 +1,4 @@
-"""The judge's shapes: from the cell to the sample.
+"""The seventh shapes: from the cell to the sample.
 
 Sources: lines whose far end throws waves back (Wylie and Streeter, Fluid Transients) and damping by a fractional
 derivative (Bagley and Torvik 1983, Oustaloup 1991); filters after Cauer (1958) and amplifiers that are no faster than
@@ -16,7 +16,7 @@ from numba import njit
 from scipy.signal import ellipap, lfilter
 
 from .outside_bench import _child
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import _LAG, _RESONANCE, _disturb, ramp_filter
 from .third_outside_bench import _fades
 
@@ -43,7 +43,7 @@ def fractional(power: float, damping: float) -> tuple[np.ndarray, np.ndarray, fl
     return num * den[-1] / num[-1], den, float(abs(pair)), float(-pair.real / abs(pair))
 
 
-@judge_shapes("resonance", "line", "fractional_damper")
+@more_shapes("resonance", "line", "fractional_damper")
 def resonance(build: Build, shape: str, size: float) -> dict[str, float]:
     """The force comes through a line that throws it back, with all odd harmonics; or a damper of a polymer, s^α.
 
@@ -76,7 +76,7 @@ def _slewed(force, h, tau, most_N_s):
     return out
 
 
-@judge_shapes("sensor_lag", "cauer", "slew_rate")
+@more_shapes("sensor_lag", "cauer", "slew_rate")
 def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     """Four poles and two pairs of zeros after Cauer, of 0.5 and 40 dB; or a first order that is no faster than a rate.
 
@@ -98,7 +98,7 @@ def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"time_constant": tau}
 
 
-@judge_shapes("force_delay", "two_cycles", "saves_power")
+@more_shapes("force_delay", "two_cycles", "saves_power")
 def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
     """One task reads the cell, another one reads the first, each by a cycle of its own; or a link that dozes at rest.
 
@@ -132,7 +132,7 @@ def pulled(angle: np.ndarray, pull: float) -> np.ndarray:
     return angle + np.angle(np.exp(1j * (phase - angle)))
 
 
-@judge_shapes("clock_skew", "pulled", "governor")
+@more_shapes("clock_skew", "pulled", "governor")
 def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     """Another oscillator nearly catches the clock, which slips past it at times; or one that changes its speed.
 
@@ -160,7 +160,7 @@ def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"skew": 1e6 * float(gained(duration)) / duration}
 
 
-@judge_shapes("force_bias", "rectified")
+@more_shapes("force_bias", "rectified")
 def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     """A drive's carrier is rectified: 10 to 20 % more of it while the motor moves; stated is the mean over time."""
     rng, motion = build.rng, build.plant.motion
@@ -175,7 +175,7 @@ def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"bias": bias}
 
 
-@judge_shapes("force_drift", "clouds", "found_anew")
+@more_shapes("force_drift", "clouds", "found_anew")
 def force_drift(build: Build, shape: str, size: float) -> dict[str, float]:
     """It drifts as the sun shines on it, and back by half of that behind clouds; or its zero is found anew at times.
 
@@ -191,7 +191,7 @@ def force_drift(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"rate": rate}
 
 
-@judge_shapes("mains_hum", "bursts")
+@more_shapes("mains_hum", "bursts")
 def mains_hum(build: Build, shape: str, size: float) -> dict[str, float]:
     """A heater is fed in bursts of whole waves, 0.4 to 0.7 of 20 to 60 of them; stated is the mean over time."""
     rng = build.rng

@@ -1,4 +1,4 @@
-"""The judge's effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""The seventh effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together. Sources: springs beside the sample, as of
 flexures (Smith, Flexures) and gaiters; marks of a shunt that an amplifier puts in by itself (Doebelin, Measurement
@@ -13,12 +13,12 @@ import numpy as np
 
 from .fourth_outside_bench import _wandering
 from .outside_bench import _AMPLIFIER, _CELL, _child
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 from .sensor import _disturb
 from .third_outside_bench import _fades
 
 
-@judge_effect("guide_spring", "flexure", "gaiter")
+@effect("guide_spring", "flexure", "gaiter")
 def guide_spring(build: Build, shape: str, size: float) -> dict[str, float]:
     """A spring beside the pad, felt in air as well as under load: nothing where the cell was tared, at the start.
 
@@ -44,7 +44,7 @@ def guide_spring(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"spring": spring}
 
 
-@judge_effect("shunt_marks", "one_way", "both_ways")
+@effect("shunt_marks", "one_way", "both_ways")
 def shunt_marks(build: Build, shape: str, size: float) -> dict[str, float]:
     """At even distances, every 2 to 5 s, the amplifier puts in a shunt for 0.25 to 0.5 s, to check itself.
 
@@ -63,7 +63,7 @@ def shunt_marks(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"step": step, "every": every, "lasts": lasts}
 
 
-@judge_effect("touch_heat", "one_body", "two_bodies")
+@effect("touch_heat", "one_body", "two_bodies")
 def touch_heat(build: Build, shape: str, size: float) -> dict[str, float]:
     """Pad and probe are not equally warm: as long as they touch, at any depth, the cell's zero goes, and back in air.
 
@@ -80,7 +80,7 @@ def touch_heat(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"zero": zero, "time_constant": tau}
 
 
-@judge_effect("coarse_codes", "logarithm", "uneven")
+@effect("coarse_codes", "logarithm", "uneven")
 def coarse_codes(build: Build, shape: str, size: float) -> dict[str, float]:
     """The force is kept in few codes; nothing is a code of its own.
 
@@ -108,7 +108,7 @@ def coarse_codes(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"width": width}
 
 
-@judge_effect("fringes", "drift", "wander")
+@effect("fringes", "drift", "wander")
 def fringes(build: Build, shape: str, size: float) -> dict[str, float]:
     """A cell that counts fringes of light is off by a sine of the force, whose phase goes with the light's colour.
 
@@ -128,7 +128,7 @@ def fringes(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "wave": wave}
 
 
-@judge_effect("drive_noise", "in_motion", "by_speed")
+@effect("drive_noise", "in_motion", "by_speed")
 def drive_noise(build: Build, shape: str, size: float) -> dict[str, float]:
     """What a drive's switching leaves in the leads: a noise of 4 to 12 ms at any force, only while the motor moves.
 

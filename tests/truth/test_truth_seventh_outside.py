@@ -1,9 +1,9 @@
-"""The judge's effects outside the catalogue: each is what its docstring says."""
+"""The seventh effects outside the catalogue: each is what its docstring says."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_outside_pad import _roused
+from .effects.seventh_outside_pad import _roused
 from .motion import Path
 from .sets import SETS, outside, shapes_of
 from .test_truth_cases import CATALOGUE
@@ -13,8 +13,8 @@ from .test_truth_third_outside import added
 
 
 def test_they_are_of_the_bench_or_of_the_pad():
-    mine = outside(CATALOGUE, "judge")
-    assert len(mine) == 11 and all(shapes_of(id, *SETS) == shapes_of(id, "judge") for id in mine)
+    mine = outside(CATALOGUE, "seventh")
+    assert len(mine) == 11 and all(shapes_of(id, *SETS) == shapes_of(id, "seventh") for id in mine)
 
 
 def test_a_spring_beside_the_pad():
@@ -35,7 +35,7 @@ def test_a_spring_beside_the_pad():
         assert tau[0] == pytest.approx(tau[1], rel=1e-2) and 0.99 <= tau[0] <= 4.01
 
 
-@pytest.mark.parametrize("shape", shapes_of("shunt_marks", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("shunt_marks", "seventh"))
 def test_marks_of_a_shunt(shape):
     t = np.arange(0, 60, 1e-3)
     for motion in (Path(-1.0).hold(60.0).motion(), Path(1.0).hold(60.0).motion()):
@@ -53,7 +53,7 @@ def test_heat_of_a_touch():
     t, zeros = np.arange(0, 59.9, 1e-3), []
     for depth in (0.3, 2.0):
         motion = Path(-0.01, np.inf).to(depth, 100.0).hold(30.0).to(-0.01, 100.0).hold(30.0).motion()
-        for shape in shapes_of("touch_heat", "judge"):
+        for shape in shapes_of("touch_heat", "seventh"):
             _, told, build = hidden("touch_heat", shape, motion=motion)
             zeros.append(added(build, t) / told["zero"])
             # As it grows in contact, so it fades in air.
@@ -70,7 +70,7 @@ def test_heat_of_a_touch():
     assert np.allclose(zeros[0], zeros[2], atol=0.03) and np.allclose(zeros[1][:30_000], zeros[3][:30_000], atol=1e-6)
 
 
-@pytest.mark.parametrize("shape", shapes_of("coarse_codes", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("coarse_codes", "seventh"))
 def test_few_codes(shape):
     _, told, build = hidden("coarse_codes", shape)
     ((_, stage),) = build.plant.sensor
@@ -93,7 +93,7 @@ def test_few_codes(shape):
     assert np.max(np.abs(read - force)) < 1.3 * 7.2 * told["width"]
 
 
-@pytest.mark.parametrize("shape", shapes_of("fringes", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("fringes", "seventh"))
 def test_fringes_of_light(shape):
     _, told, build = hidden("fringes", shape)
     ((_, stage),) = build.plant.sensor
@@ -111,7 +111,7 @@ def test_fringes_of_light(shape):
         assert 0.5 < np.std(phase) < 3.0 and np.max(np.abs(np.diff(phase, 1))) < 0.5
 
 
-@pytest.mark.parametrize("shape", shapes_of("drive_noise", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("drive_noise", "seventh"))
 def test_noise_of_a_drive(shape):
     path = Path(-1.0).hold(5.0)
     for _ in range(6):
@@ -157,7 +157,7 @@ def test_a_muscle_that_is_roused():
             assert ends[0][0] == pytest.approx(first, rel=0.04)
 
 
-@pytest.mark.parametrize("shape", shapes_of("loose_fill", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("loose_fill", "seventh"))
 def test_a_filling_that_lies_otherwise(shape):
     motion = touches(120, depth=1.9, hold_s=0.02, air_s=0.02)
     fine, told, _ = hidden("loose_fill", shape, motion=motion)
@@ -174,7 +174,7 @@ def test_a_filling_that_lies_otherwise(shape):
     assert follows == pytest.approx(0.6 if shape == "bit_by_bit" else 0.0, abs=0.16)
 
 
-@pytest.mark.parametrize("shape", shapes_of("clonus", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("clonus", "seventh"))
 def test_a_muscle_that_beats(shape):
     path = Path(-0.5)
     for _ in range(12):
@@ -214,7 +214,7 @@ def test_a_front_that_goes_in():
         assert 1.0 <= told["whole"] <= 2.0
 
 
-@pytest.mark.parametrize("shape", shapes_of("air_mattress", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("air_mattress", "seventh"))
 def test_a_mattress_of_air(shape):
     motion = Path(-0.5).to(1.0, 50.0).hold(60.0).motion()
     fine, told, _ = hidden("air_mattress", shape, motion=motion)

@@ -1,10 +1,10 @@
-"""The judge's shapes of what lies between the motor and the pad against closed forms."""
+"""The seventh shapes of what lies between the motor and the pad against closed forms."""
 
 import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_machine import Coned, _oiled, _power_elements
+from .effects.seventh_machine import Coned, _oiled, _power_elements
 from .laws import Power
 from .motion import Path
 from .sets import shapes_of
@@ -46,10 +46,10 @@ def test_a_taper_that_jams(seed):
     assert stuck.sum() > 50 and np.ptp(given[stuck]) < 1e-6
 
 
-@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("frame_compliance", "seventh"))
 @pytest.mark.parametrize("other", ["friction", "adhesion", "viscous_damping", "stress_softening", "damage"])
 def test_the_frame_goes_with_other_effects(shape, other):
-    shapes = {"frame_compliance": shape, other: shapes_of(other, "judge")[0]}
+    shapes = {"frame_compliance": shape, other: shapes_of(other, "seventh")[0]}
     plain = {"motion": SHORT, "rate_hz": 500.0, "law": "power", "contact": "unilateral"}
     truth = draw_case(7, ("frame_compliance", other), 1.0, shapes, **plain).truth
     fine, compliance = truth.fine, truth.parameters["frame_compliance"]["compliance"]

@@ -1,4 +1,4 @@
-"""The judge's effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""The seventh effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together. Sources: muscle that strengthens from beat to
 beat (Bowditch 1871) or tires (Fitts 1994); fillings of shreds and beans, which lie otherwise in each touch (Cates,
@@ -14,7 +14,7 @@ from numba import njit
 
 from .fourth_outside_pad import _touches
 from .outside_bench import _child
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 
 
 @njit(cache=True)
@@ -31,7 +31,7 @@ def _roused(depth, h, enough_mm, step, fades_s):
     return out
 
 
-@judge_effect("staircase", "strengthens", "tires")
+@effect("staircase", "strengthens", "tires")
 def staircase(build: Build, shape: str, size: float) -> dict[str, float]:
     """A muscle is another one after each touch, and forgets them: by a share of what is left, however deep they were.
 
@@ -49,7 +49,7 @@ def staircase(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"more": more, "step": step, "fades": fades_s}
 
 
-@judge_effect("loose_fill", "each_touch", "bit_by_bit")
+@effect("loose_fill", "each_touch", "bit_by_bit")
 def loose_fill(build: Build, shape: str, size: float) -> dict[str, float]:
     """Shreds or beans lie otherwise in each touch: softer here and stiffer there along the way in, never the same.
 
@@ -71,7 +71,7 @@ def loose_fill(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"deviation": deviation}
 
 
-@judge_effect("clonus", "dies_down", "holds_on")
+@effect("clonus", "dies_down", "holds_on")
 def clonus(build: Build, shape: str, size: float) -> dict[str, float]:
     """A muscle that is stretched too fast beats, at 5 to 7 Hz, 40 to 80 ms later; slow presses leave it alone.
 
@@ -96,7 +96,7 @@ def clonus(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "frequency": float(frequency), "late": float(late_s)}
 
 
-@judge_effect("front", "hardens", "thaws")
+@effect("front", "hardens", "thaws")
 def front(build: Build, shape: str, size: float) -> dict[str, float]:
     """From the surface down the pad becomes another one, to a depth that goes with the root of time.
 
@@ -115,7 +115,7 @@ def front(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"more": more, "whole": whole}
 
 
-@judge_effect("air_mattress", "by_turns", "topped_up")
+@effect("air_mattress", "by_turns", "topped_up")
 def air_mattress(build: Build, shape: str, size: float) -> dict[str, float]:
     """The pad is full of air, and a pump sees to it; its pressure goes by the pump, and not by what the probe does.
 

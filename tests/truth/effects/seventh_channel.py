@@ -1,4 +1,4 @@
-"""The judge's shapes: faults of the force channel.
+"""The seventh shapes: faults of the force channel.
 
 Sources: amplifiers that clip at a supply which is not regulated (Horowitz and Hill, The Art of Electronics); words
 whose bytes come in the wrong order (Cohen 1981), and pulses of fences or radars that come by the clock (CISPR 16);
@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, judge_shapes
+from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, more_shapes
 
 
-@judge_shapes("saturation", "ripple")
+@more_shapes("saturation", "ripple")
 def saturation(build: Build, shape: str, size: float) -> dict[str, float]:
     """A limit with a ripple of 2 to 5 % either way, at 100 or 120 Hz: |sin| less its mean; stated is its mean."""
     share = max(1 - 0.2 * size * float(build.rng.uniform(0.8, 1.2)), 0.3)
@@ -37,7 +37,7 @@ def swapped(force_N: np.ndarray, full_N: float) -> np.ndarray:
     return words.byteswap() * full_N / 32767
 
 
-@judge_shapes("outliers", "swapped_bytes", "by_the_clock")
+@more_shapes("outliers", "swapped_bytes", "by_the_clock")
 def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     """A word whose bytes are swapped, ± 50 N full; or a pulse of one sign that comes at even distances.
 
@@ -68,7 +68,7 @@ def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     return fraction
 
 
-@judge_shapes("stuck_samples", "file_grows", "battery")
+@more_shapes("stuck_samples", "file_grows", "battery")
 def stuck_samples(build: Build, shape: str, size: float) -> dict[str, float]:
     """At even distances the logger writes its file anew, which takes longer each time; or a link that gets worse.
 

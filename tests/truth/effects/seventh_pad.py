@@ -1,4 +1,4 @@
-"""The judge's shapes of the pad's own effects. Those in which force and motion act on each other are forms of `kernel`.
+"""The seventh shapes of the pad's own effects. Those in which force and motion act on each other are forms of `kernel`.
 
 Sources: rubbers that heal together by the root of time (Wool and O'Connor 1981); a cohesive zone of even stress
 (Dugdale 1960, Maugis 1992) and cups that hold by suction, whose gas follows Boyle; masses of fibres (van Wyk 1946)
@@ -23,13 +23,13 @@ from scipy.optimize import brentq
 from ..laws import Law, _Tabulated
 from ..pad import Pad
 from .curves import stretched
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sixth_pad import _visits
 from .structure import hide_law
 from .third_outside_bench import _fades
 
 
-@judge_shapes("separation", "heals")
+@more_shapes("separation", "heals")
 def separation(build: Build, shape: str, size: float) -> dict[str, float]:
     """The lab believes `bonded`. It bears 2 % of the greatest force after 1 to 4 s of contact, by its root."""
     build.believed = replace(build.believed, contact="bonded")
@@ -38,7 +38,7 @@ def separation(build: Build, shape: str, size: float) -> dict[str, float]:
     return {}
 
 
-@judge_shapes("adhesion", "dugdale", "suction")
+@more_shapes("adhesion", "dugdale", "suction")
 def adhesion(build: Build, shape: str, size: float) -> dict[str, float]:
     """P over all of the range, on the way in too, and nothing beyond; or a cup whose seal breaks at the range.
 
@@ -74,7 +74,7 @@ class Kondner(_Tabulated):
         return self.modulus * depth_mm / (depth_mm + self.scale)
 
 
-@judge_shapes("elastic_law", "van_wyk", "kondner")
+@more_shapes("elastic_law", "van_wyk", "kondner")
 def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     """The true law is that of the name; the believed one is fitted to it. Sizes but 1 lie between (or beyond) both."""
     rng, depth = build.rng, build.depth_mm
@@ -94,7 +94,7 @@ def _leaves(x, way):
     return out
 
 
-@judge_shapes("stress_softening", "debonding", "two_paths")
+@more_shapes("stress_softening", "debonding", "two_paths")
 def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
     """η = 1 − s D(δ_max) (1 − e^{−q}), q = (δ_max − δ)/d; or 1 − s (1 − e^{−q}) on the way out and less of it back in.
 
@@ -159,7 +159,7 @@ def _by_stroke(x, most, power):
     return out
 
 
-@judge_shapes("damage", "layers", "by_stroke")
+@more_shapes("damage", "layers", "by_stroke")
 def damage(build: Build, shape: str, size: float) -> dict[str, float]:
     """Forty layers, each of which tires as it is gone through; or strokes that cost by a power of their range.
 
@@ -192,7 +192,7 @@ def _pressed(x, h, speed, power):
     return out
 
 
-@judge_shapes("permanent_set", "slow_presses", "shakes_down")
+@more_shapes("permanent_set", "slow_presses", "shakes_down")
 def permanent_set(build: Build, shape: str, size: float) -> dict[str, float]:
     """Slow presses leave more, by (v_ref/v)^p, p of 0.1 to 0.25; or each cycle a smaller part of what is still missing.
 
@@ -232,7 +232,7 @@ def pair_rates(rate: float) -> tuple[np.ndarray, np.ndarray]:
     return weights, rate * unit * rates
 
 
-@judge_shapes("missing_relaxation_mode", "sphere", "double_reptation")
+@more_shapes("missing_relaxation_mode", "sphere", "double_reptation")
 def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, float]:
     """What diffuses out of grains, six terms, the slowest of which is stated; or chains that let go in pairs.
 
@@ -258,7 +258,7 @@ def permeability(strain: np.ndarray | float, porosity: float) -> np.ndarray:
     return left**3 / (1 - left) ** 2 / (porosity**3 / (1 - porosity) ** 2)
 
 
-@judge_shapes("depth_dependent_relaxation", "kozeny", "zhurkov")
+@more_shapes("depth_dependent_relaxation", "kozeny", "zhurkov")
 def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[str, float]:
     """Pores that close let water through by φ³/(1 − φ)², φ_0 of 0.6 to 0.85; or an exponential of the load.
 
@@ -282,7 +282,7 @@ def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[st
     return {"slope": slope}
 
 
-@judge_shapes("viscous_damping", "carreau", "blow_off")
+@more_shapes("viscous_damping", "carreau", "blow_off")
 def viscous_damping(build: Build, shape: str, size: float) -> dict[str, float]:
     """c_0 v (1 + (v/v_0)²)^{−0.3}, v_0 of 4 to 15 mm/s; or a valve that opens at 6 to 15 mm/s, a quarter beyond.
 
