@@ -101,6 +101,9 @@ def hum_cause(line: Line) -> Cause:
     if line.swing:
         names = ("period", "swell", "swell_phase", "wander", "wander_phase")
         return cause_of(hum, hum.form("swinging"), values | dict(zip(names, line.swing, strict=True)))
+    if line.bursts:
+        own = dict(zip(("waves", "fed", "first"), map(float, line.bursts), strict=True))
+        return cause_of(hum, hum.form("bursts"), values | own)
     if line.fires_rad:
         return cause_of(hum, hum.form("dimmed"), values | {"fires": line.fires_rad})
     if line.higher:

@@ -31,6 +31,7 @@ TOLD = 15.0  # times the noise power per sample: what a further number of the li
 HARMONICS = tuple(range(2, 8))
 FIRES = tuple(np.deg2rad(np.arange(10.0, 160.0, 5.0)).tolist())  # angles of a dimmer
 WINDOW_S, FEWEST = 1.0, 20  # in which a line stands still while it swings slowly, and samples that tell of it there
+MOST_WAVES, LEAST_FED = 160, 0.1  # of a burst's period; of the samples, that it is fed in
 MOST_GROWTH = 2.0  # of the amplitude, from the least load of the holds to the greatest
 
 
@@ -53,6 +54,9 @@ class Line:
     higher: tuple[tuple[int, float, float], ...] = ()
     swing: tuple[float, ...] = ()
     fires_rad: float = 0.0
+    bursts: tuple[int, ...] = ()
+    """(waves, how many of them are fed, number of the first), where it comes in bursts of whole waves; the amplitude is
+    the mean over time."""
 
     @property
     def of_the_mains(self) -> bool:
@@ -68,6 +72,10 @@ class Line:
         if self.fires_rad:
             whole = swells / np.hypot(*first_of_dimmed(self.fires_rad))
             return np.asarray(whole * np.sin(first) * (first % np.pi > self.fires_rad))
+        if self.bursts:
+            waves, fed, begins = self.bursts
+            on = (np.floor(first / (2.0 * np.pi)) - begins) % waves < fed
+            return np.asarray(swells * (waves / fed) * on * np.sin(first))
         if self.swing:
             period, swell, swell_phase, wander, wander_phase = self.swing
             slow = 2.0 * np.pi * time_s / period
@@ -127,13 +135,14 @@ def find(start_s: float, parts: list[Part], stamp_s: Array, force_N: Array) -> L
         shapes.append(replace(shapes[0], amplitude_N=amplitude * there, growth_1_N=growth / there, at_N=at, higher=()))
     swinging = _swinging(line, parts, start_s)
     shapes += [swinging] if swinging is not None else []
+    shapes += [bursting] if (bursting := _bursting(line, t, e)) is not None else []
     shapes += [_dimmed(line, t, e)] if shapes[0].ratio or shapes[0].higher else []
     # the plainest, unless another one takes more than its numbers do by chance
     return min(shapes, key=lambda one: float(np.sum((e - one.force_N(t, load)) ** 2)) + least * _numbers(one))
 
 
 def _numbers(line: Line) -> int:
-    own = (line.growth_1_N != 0.0) + (line.fires_rad > 0.0) + len(line.swing)
+    own = (line.growth_1_N != 0.0) + (line.fires_rad > 0.0) + len(line.swing) + len(line.bursts)
     return 2 * (line.ratio > 0.0) + 2 * len(line.higher) + own
 
 
@@ -154,6 +163,29 @@ def _dimmed(line: Line, t: Array, e: Array) -> Line:
     simplex = start + np.vstack([np.zeros(3), np.diag([0.05, 0.1, 0.1])])
     best = minimize(left, start, method="Nelder-Mead", options={"initial_simplex": simplex, "maxfev": 200}).x
     return one(*best.tolist())
+
+
+def _bursting(line: Line, t: Array, e: Array) -> Line | None:
+    """The line in bursts of whole waves: the period, the first wave and their count that take the most."""
+    turns = line.frequency_Hz * t + line.phase_rad / (2.0 * np.pi)
+    wave, in_phase = np.floor(turns).astype(np.intp), e * np.sin(2.0 * np.pi * turns)
+    best, found = 0.0, None
+    for waves in range(4, min(MOST_WAVES, int(np.ptp(wave)) // 4)):
+        slot = (wave - wave.min()) % waves
+        of_slot, count = np.bincount(slot, in_phase, waves), np.bincount(slot, minlength=waves)
+        # sums over all runs of slots: as many rows as first slots, as many columns as lengths
+        at = np.arange(waves)[:, None] + np.arange(1, waves)
+        runs, counts = (np.concatenate([[0.0], np.cumsum(np.tile(a, 2))]) for a in (of_slot, count))
+        taken, there = runs[at] - runs[:waves, None], counts[at] - counts[:waves, None]
+        power = np.where(there > LEAST_FED * len(e), taken * np.abs(taken) / np.maximum(there, 1.0), 0.0)
+        first, length = np.unravel_index(int(np.argmax(power)), power.shape)
+        if power[first, length] > best:
+            fed = int(length) + 1
+            level = 2.0 * float(taken[first, length] / there[first, length]) * fed / waves
+            best = float(power[first, length])
+            begins = int((first + wave.min()) % waves)
+            found = replace(line, amplitude_N=level, bursts=(waves, fed, begins))
+    return found
 
 
 def _with_harmonics(line: Line, t: Array, e: Array, least: float, highest: float, spacing: float) -> Line:

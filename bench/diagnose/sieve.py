@@ -159,8 +159,8 @@ class Sieve:
         return [self._carried(again, ALL)] if again is not None and again.score < trial.score else []
 
     def _late_alike(self, fit: Fit, ranked: list[Trial], family: dict[str, list[Form]]) -> list[Trial]:
-        """Where a delay, a lag or a stiff resonance fits as well as any: the others again, from where they are as late as
-        it. A relaxation mode can have taken their place, so that no signature shows them."""
+        """Where a delay, a lag or a stiff resonance fits as well as any: the others again, from where they are as late.
+        A relaxation mode can have taken their place, so that no signature shows them."""
         enough = AS_LATE * (fit.chi2 - ranked[0].fit.chi2) if ranked else 0.0
         best = next((t for t in ranked if t.id in LATE and fit.chi2 - t.fit.chi2 >= enough), None)
         late_s = 0.0 if best is None else lateness_s(best.id, best.fit.structure.values(best.fit.x)[-1])

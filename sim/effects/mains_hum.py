@@ -10,6 +10,8 @@ Phases are at the first sample.
 - `distorted`: with all harmonics from the second to the seventh; rectifiers of half waves make the even ones.
 - `swinging`: amplitude and phase swing slowly, amplitude · (1 + swell · sin(2πt/period + …)) ·
   sin(2πft + phase + wander · sin(2πt/period + …)), as the grid's frequency does and what else it feeds.
+- `bursts`: let through for `fed` of every `waves` whole waves, from wave number `first` on, as heaters are that are
+  switched at zero crossings (IEC 61000-3-3, burst firing); `amplitude` is the mean over time, waves begin at phase 0.
 - `loaded`, `loaded_harmonics`: the same, times 1 + growth · (F − at_force) of the force F at the cell. A bridge
   multiplies its supply by its load, so ripple of the supply is hum that grows with the force; what comes by the cable
   and the bridge's own zero does not grow.
@@ -94,6 +96,22 @@ def swinging(dt: float, force: float, state: State, p: State) -> float:
 
 
 @block
+def bursts(dt: float, force: float, state: State, p: State) -> float:
+    """Force with the hum; p = (amplitude while it is fed, frequency, phase, waves, fed, first)."""
+    state[0] += dt
+    turns = p[1] * state[0] + p[2] / (2.0 * math.pi)
+    fed = (math.floor(turns) - p[5]) % p[3] < p[4]
+    return force + p[0] * math.sin(2.0 * math.pi * turns) if fed else force
+
+
+def _while_fed(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `bursts` reads."""
+    waves, fed = round(values["waves"]), min(round(values["fed"]), round(values["waves"]))
+    most = values["amplitude"] * waves / fed
+    return (most, values["frequency"], values["phase"], float(waves), float(fed), float(round(values["first"])))
+
+
+@block
 def loaded(dt: float, force: float, state: State, p: State) -> float:
     """Force with the hum; p = (amplitude, frequency, phase, growth, at_force)."""
     state[0] += dt
@@ -150,6 +168,11 @@ _SWING = (
     Parameter("wander", "rad", 0.0, 20.0, 0.1, "how far the phase swings"),
     phase("wander_phase", "phase of that at the first sample"),
 )
+_BURSTS = (
+    Parameter("waves", "1", 2.0, 1e4, 50.0, "whole waves after which it repeats", fixed=True),
+    Parameter("fed", "1", 1.0, 1e4, 25.0, "how many of them are let through", fixed=True),
+    Parameter("first", "1", 0.0, 1e4, 0.0, "number of the first one", default=0.0, fixed=True),
+)
 _LOAD = (
     Parameter("growth", "1/N", -1e3, 1e3, 0.1, "by how much of itself it grows with each newton of load"),
     Parameter("at_force", "N", -1e5, 1e5, 0.0, "force at which the amplitude is as stated", fixed=True),
@@ -198,6 +221,15 @@ EFFECT = Effect(
             blocks={"sensor": dimmed},
             state=(0.0,),
             pack=_whole,
+        ),
+        Form(
+            name="bursts",
+            what="so many whole waves on, so many off",
+            parameters=(_AMPLITUDE, _FREQUENCY, _PHASE, *_BURSTS),
+            sought=False,
+            blocks={"sensor": bursts},
+            state=(0.0,),
+            pack=_while_fed,
         ),
         Form(
             name="distorted",

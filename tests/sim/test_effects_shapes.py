@@ -133,6 +133,17 @@ def test_hum_of_a_dimmer() -> None:
         )
 
 
+def test_hum_in_bursts() -> None:
+    t = np.arange(0.0, 2.0, 1e-4)
+    hum = active("mains_hum", "bursts", amplitude=0.03, frequency=50.0, phase=0.5, waves=20, fed=12, first=3)
+    wave = sense(hum, t, np.zeros(t.size))
+    turns = 50.0 * t + 0.5 / (2 * math.pi)
+    on = np.isin(np.floor(turns) % 20, np.arange(3, 15))
+    assert_allclose(wave, np.where(on, 0.05 * np.sin(2 * math.pi * turns), 0.0), atol=1e-6)
+    first = abs(np.mean(2 * wave * np.exp(-2j * math.pi * 50.0 * t)))
+    assert_allclose(first, 0.03, rtol=0.01)
+
+
 def test_hum_with_all_its_harmonics() -> None:
     t = np.arange(20_000) * 1e-5
     names = ("second", "third", "fourth", "fifth", "sixth", "seventh")

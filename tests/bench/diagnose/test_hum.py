@@ -1,0 +1,38 @@
+"""Mains hum found in holds: bursts of whole waves, and hum that is always there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bench.diagnose.hum import find
+from bench.diagnose.noise import Part
+
+Array = np.ndarray
+
+
+def hummed(fed: Array, rng: np.random.Generator, rate_hz: float = 700.0) -> tuple[Array, Array, Array, list[Part]]:
+    """(stamps, hum, force with noise of 10 mN, holds of 4 s): 40 mN at 50.02 Hz, its waves fed or not by turns."""
+    t = np.arange(0.0, 48.0, 1.0 / rate_hz)
+    turns = 50.02 * t + 0.3
+    hum = 0.04 * np.sin(2 * np.pi * turns) * fed[np.floor(turns).astype(int) % len(fed)]
+    force = 2.0 + hum + 0.01 * rng.standard_normal(t.size)
+    holds = [(t >= k) & (t < k + 4.0) for k in np.arange(1.0, 47.0, 6.0)]
+    return t, hum, force, [(t[h], force[h] - 2.0, float(force[h].mean())) for h in holds]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bursts_of_whole_waves_are_found_with_their_period(seed):
+    fed = np.arange(37) < 21
+    t, hum, force, parts = hummed(np.roll(fed, 5 + seed), np.random.default_rng(seed))
+    line = find(0.0, parts, t, force)
+    assert line is not None and line.bursts[:2] == (37, 21)
+    assert line.amplitude_N == pytest.approx(0.04 * 21 / 37, rel=0.05)
+    assert np.sqrt(np.mean((line.force_N(t, force) - hum) ** 2)) < 0.1 * 0.04
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_hum_that_is_always_there_comes_in_no_bursts(seed):
+    t, _, force, parts = hummed(np.ones(1), np.random.default_rng(seed))
+    line = find(0.0, parts, t, force)
+    assert line is not None and not line.bursts and line.amplitude_N == pytest.approx(0.04, rel=0.05)
