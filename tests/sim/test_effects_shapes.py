@@ -306,3 +306,15 @@ def test_a_pull_that_is_the_same_up_to_its_range() -> None:
     force = simulate(LINEAR, [pulls], np.arange(22.0), x)
     away = np.round(-x, 6)
     assert_allclose(force, np.where(away < 0.5, -0.2, np.where(away > 0.5, 0.0, -0.1)), atol=2e-4)
+
+
+def test_softening_that_is_less_on_the_way_back_in() -> None:
+    x = np.interp(np.arange(701.0), [0.0, 200.0, 300.0, 500.0, 700.0], [0.0, 2.0, 1.0, 3.0, 2.0])
+    soft = active("stress_softening", "two_ways", share=0.3, depth=0.5, again=0.6, turn=0.1)
+    factor = simulate(LINEAR, [soft], np.arange(x.size, dtype=float), x)[1:] / (K * x[1:])
+    below = np.maximum.accumulate(x)[1:] - x[1:]
+    out, back = np.s_[215:299], np.s_[315:399]
+    assert_allclose(factor[:199], 1.0)
+    assert_allclose(factor[out], 1.0 - 0.3 * -np.expm1(-below[out] / 0.5))
+    assert_allclose(factor[back], 1.0 - 0.3 * 0.6 * -np.expm1(-below[back] / 0.5))
+    assert_allclose(factor[400:499], 1.0)
