@@ -35,6 +35,7 @@ LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
 BENDS_AT = (0.08, 0.14, 0.2, 0.28, 0.38, 0.5, 0.7)  # of the depth reached
 MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
 FRESH = 0.9  # of the depth reached, beyond which a softening pad must go for the first time in the run
+EVERY = tuple(0.1 * 1.1**k for k in range(24))  # of the run
 LONGEST_REPORTED = 0.7  # of the depth, for errors of the position: longer ones are another elastic law
 
 
@@ -94,6 +95,9 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     elif p.name == "moved_at":
         upper = min(upper, reach.span_s)
         starts, default = tuple(share * reach.span_s for share in MOVED_AT), 0.5 * reach.span_s
+    elif p.name == "every":  # a saw tooth that is a little too long is off by a whole one in the end
+        starts, default = tuple(share * reach.span_s for share in EVERY), 0.3 * reach.span_s
+        lower, upper = EVERY[0] * reach.span_s, reach.span_s
     elif p.name == "at_time":
         default = 0.5 * reach.span_s
     elif p.name == "bends_at":  # a rate that is another one but for a moment at the begin is a step

@@ -82,27 +82,42 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     path = search.path(base)
     prepared = search.prepared
     prepared, flags, search, path = _asked_again(m, prepared, flags, search, path)
-    base, final = path.fits[0], path.fits[-1]
-    final = ordered(prepared, reshaped(prepared.short, final, len(base.structure.causes)), base)
+    base = path.fits[0]
+    final = ordered(prepared, reshaped(prepared.short, path.fits[-1], len(base.structure.causes)), base)
     tell("predicting what was held out")
-    fits = chain(prepared, final, base)
     floor = _floor(prepared, final)
-    squares, excess = excesses(prepared, fits, floor)
-    apart = _flagged_square(prepared, fits[0])
-    while len(fits) > 1:
-        slow = _slow_squares(prepared, fits, squares)
-        needless = _needless(prepared, fits, squares, excess, apart, slow)
-        if needless is None:
-            needless = _doubtful(path, fits, excess, apart, floor, slow)
-        if needless is None:
-            break
-        fits, squares, excess = _dropped(prepared, fits, needless, floor)
+    fits, squares, excess = _needed(prepared, path, final, floor)
     whole = _whole(prepared, fits, search.believed)
     faded = _faded(fits, whole[1])
     if faded is not None:
         fits, squares, excess = _dropped(prepared, fits, faded, floor)
         whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
+
+
+def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple[list[Fit], list[float], list[float]]:
+    """The chain of those causes that what was held out needs, with its held-out squares and excesses. `final`: all that
+    were found, in their best shapes."""
+    base, plain = path.fits[0], path.fits[-1]
+    apart = _flagged_square(prepared, base)
+
+    def needless(fits: list[Fit], squares: list[float], excess: list[float]) -> int | None:
+        slow = _slow_squares(prepared, fits, squares)
+        number = _needless(prepared, fits, squares, excess, apart, slow)
+        return _doubtful(path, fits, excess, apart, floor_N, slow) if number is None else number
+
+    fits = chain(prepared, final, base)
+    squares, excess = excesses(prepared, fits, floor_N)
+    shapes, as_found = ({(c.id, c.form.name) for c in fit.structure.causes} for fit in (final, plain))
+    untried = shapes != as_found
+    while len(fits) > 1 and (number := needless(fits, squares, excess)) is not None:
+        if untried:  # it may be the shape that does harm, and not the cause
+            untried, others = False, chain(prepared, ordered(prepared, plain, base), base)
+            of_them = excesses(prepared, others, floor_N)
+            if needless(others, *of_them) is None:
+                return others, *of_them
+        fits, squares, excess = _dropped(prepared, fits, number, floor_N)
+    return fits, squares, excess
 
 
 def _dropped(

@@ -12,6 +12,8 @@ first sample in all forms.
 - `bent`: rate · t until a time, and a share of that rate from there on, as where a door is opened or a heater goes off.
 - `two_bodies`: a share of it settles within τ, the rest within `later` times as long: gauge and body of a cell.
 - `quickening`: rate · t (1 + t/2τ), as a supply that ends: twice as quick at τ.
+- `rezeroed`: rate · (t mod `every`), as where a device finds its zero anew at even distances (OIML R 76-1,
+  Non-automatic weighing instruments: devices that set zero by themselves).
 
 Reference: OIML R 60, Metrological regulation for load cells (creep, and temperature effect on the dead load output).
 """
@@ -66,6 +68,13 @@ def two_bodies(dt: float, force: float, state: State, p: State) -> float:
     slow = p[1] * p[3]
     soon, late = p[1] * math.expm1(-state[0] / p[1]), slow * math.expm1(-state[0] / slow)
     return force - p[0] * (p[2] * soon + (1.0 - p[2]) * late)
+
+
+@block
+def rezeroed(dt: float, force: float, state: State, p: State) -> float:
+    """Saw tooth of time; p = (rate, every)."""
+    state[0] += dt
+    return force + p[0] * (state[0] % p[1])
 
 
 @block
@@ -162,6 +171,13 @@ EFFECT = Effect(
             parameters=(_RATE, _time_constant("time after which it is twice as quick")),
             sought=False,
             blocks={"sensor": quickening},
+            state=(0.0,),
+        ),
+        Form(
+            name="rezeroed",
+            what="back to zero at even distances",
+            parameters=(_RATE, Parameter("every", "s", 0.01, 1e6, 20.0, "time after which it is back to zero")),
+            blocks={"sensor": rezeroed},
             state=(0.0,),
         ),
         Form(

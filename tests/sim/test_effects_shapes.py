@@ -318,3 +318,11 @@ def test_softening_that_is_less_on_the_way_back_in() -> None:
     assert_allclose(factor[out], 1.0 - 0.3 * -np.expm1(-below[out] / 0.5))
     assert_allclose(factor[back], 1.0 - 0.3 * 0.6 * -np.expm1(-below[back] / 0.5))
     assert_allclose(factor[400:499], 1.0)
+
+
+def test_a_drift_that_a_device_sets_to_zero_at_times() -> None:
+    t = np.linspace(0.0, 50.0, 5001)
+    zero = sense(active("force_drift", "rezeroed", rate=0.002, every=20.0), t, np.zeros(t.size))
+    assert_allclose(
+        np.interp([0.0, 10.0, 19.9, 20.1, 35.0, 45.0], t, zero), 0.002 * np.array([0, 10, 19.9, 0.1, 15, 5])
+    )

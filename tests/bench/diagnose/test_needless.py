@@ -76,3 +76,39 @@ def test_a_cause_of_which_nothing_is_left_with_the_hum_beside_it_goes(after, gon
         return SimpleNamespace(structure=SimpleNamespace(causes=causes, values=lambda x: told), x=None)
 
     assert module._faded([fit(), fit(-4e-4, 0.05, 8.0)], fit(*after, 0.0)) == gone
+
+
+@pytest.mark.parametrize(("also_as_found", "kept"), [(False, ["force_delay/constant"]), (True, [])])
+def test_where_the_shape_does_harm_the_cause_stays_as_it_was_found(monkeypatch, also_as_found, kept):
+    """A cause is in the way in its best shape; it is only dropped where it is so in the shape it was found in too."""
+
+    def fit(*names: str) -> Any:
+        pairs = [name.split("/") for name in names]
+        causes = tuple(SimpleNamespace(id=id, form=SimpleNamespace(name=form)) for id, form in pairs)
+        return SimpleNamespace(structure=SimpleNamespace(causes=causes))
+
+    base, plain, final = fit(), fit("force_delay/constant"), fit("force_delay/wandering")
+    harmful = {"force_delay/wandering"} | ({"force_delay/constant"} if also_as_found else set())
+
+    def names(fits: list[Any]) -> list[str]:
+        return [f"{c.id}/{c.form.name}" for c in fits[-1].structure.causes]
+
+    asked = []
+
+    def asked_of(prepared: Any, fits: list[Any], *rest: Any) -> int | None:
+        asked.append(names(fits))
+        return 0 if harmful & set(names(fits)) else None
+
+    monkeypatch.setattr(module, "chain", lambda prepared, fit, base: [base, fit] if fit.structure.causes else [base])
+    monkeypatch.setattr(module, "ordered", lambda prepared, fit, base: fit)
+    monkeypatch.setattr(module, "excesses", lambda prepared, fits, floor: ([1.0] * len(fits), [1.0] * len(fits)))
+    monkeypatch.setattr(module, "_slow_squares", lambda *_: [0.0])
+    monkeypatch.setattr(module, "_flagged_square", lambda *_: 0.0)
+    monkeypatch.setattr(module, "_needless", asked_of)
+    monkeypatch.setattr(module, "_doubtful", lambda *_: None)
+    monkeypatch.setattr(module, "_dropped", lambda prepared, fits, number, floor: ([base], [1.0], [1.0]))
+    path: Any = SimpleNamespace(fits=[base, plain])
+    prepared: Any = SimpleNamespace()
+    fits, _, _ = module._needed(prepared, path, final, 1.0)
+    assert names(fits) == kept
+    assert asked == [["force_delay/wandering"], ["force_delay/constant"]]
