@@ -37,7 +37,7 @@ from .shapes import reshaped
 from .spread import covariance
 from .swing import Swing
 from .swing import find as swinging
-from .verdict import chain, excesses, explains, found, ordered, seen, sureness, without
+from .verdict import chain, excesses, explains, found, ordered, seen, sureness, told_size, without
 from .write import model_of
 
 Array = NDArray[np.float64]
@@ -88,9 +88,10 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     floor = _floor(prepared, final)
     fits, squares, excess = _needed(prepared, path, final, floor)
     whole = _whole(prepared, fits, search.believed)
-    faded = _faded(fits, whole[1])
-    if faded is not None:
-        fits, squares, excess = _dropped(prepared, fits, faded, floor)
+    gone = _faded(fits, whole[1])
+    gone = _untold(fits, whole[1], excess) if gone is None else gone
+    if gone is not None:
+        fits, squares, excess = _dropped(prepared, fits, gone, floor)
         whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
 
@@ -246,6 +247,17 @@ def _faded(fits: list[Fit], whole: Fit) -> int | None:
         name = None if cause.amplitude is None else cause.amplitude.name
         if name is not None and abs(after[own + k][name]) < FADED * abs(before[own + k][name]):
             return k
+    return None
+
+
+def _untold(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
+    """Number of a further cause whose size is not told, and that takes little, and less than is left; None: there is
+    none."""
+    own = len(fits[0].structure.causes)
+    for k in range(len(fits) - 1, 1, -1):
+        taken = excess[k - 1] - excess[k]
+        if taken < min(LITTLE * excess[0], excess[-1]) and told_size(whole, own + k - 1) < DOUBTED:
+            return k - 1
     return None
 
 

@@ -112,3 +112,20 @@ def test_where_the_shape_does_harm_the_cause_stays_as_it_was_found(monkeypatch, 
     fits, _, _ = module._needed(prepared, path, final, 1.0)
     assert names(fits) == kept
     assert asked == [["force_delay/wandering"], ["force_delay/constant"]]
+
+
+@pytest.mark.parametrize(
+    ("sizes", "excess", "gone"),
+    [
+        ([1.0, 0.2], [1.0, 0.1, 0.07], 1),
+        ([1.0, 0.9], [1.0, 0.1, 0.07], None),
+        ([1.0, 0.2], [1.0, 0.5, 0.07], None),
+        ([1.0, 0.2], [1.0, 0.1, 0.0], None),
+        ([0.1, 1.0], [1.0, 0.1, 0.07], None),
+    ],
+    ids=["little and untold", "told", "much", "nothing is left", "the first stays"],
+)
+def test_a_further_cause_without_a_size_goes_where_it_takes_little(monkeypatch, sizes, excess, gone):
+    monkeypatch.setattr(module, "told_size", lambda whole, index: sizes[index])
+    fits: list[Any] = [SimpleNamespace(structure=SimpleNamespace(causes=())) for _ in excess]
+    assert module._untold(fits, fits[-1], excess) == gone
