@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from .data import Prepared
 from .evidence import CRUMB, RIVAL, tempered, unexplained
 from .held_out import held_out_square
 from .late import LATE
+from .numbers import Cause
 from .path import Measure, Path, Trial
 from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
@@ -169,7 +170,7 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
         id_, form, numbers = described(final, own + k)
         cause = final.structure.causes[own + k]
         values = {name: number.value for name, number in numbers.items()}
-        most = min(told_size(final, own + k), 1.0 if search.reach.rich or not cause.effect.of_motion else TOLD_ONCE)
+        most = min(_of_its_size(cause, numbers), 1.0 if search.reach.rich or not cause.effect.of_motion else TOLD_ONCE)
         confidence, kind = min(confidence, most), min(kind, most)
         out.append(
             CauseFound(
@@ -180,9 +181,13 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
 
 
 def told_size(final: Fit, index: int) -> float:
+    """How sure the name of a fit's cause can be at the most, as its size is told."""
+    return _of_its_size(final.structure.causes[index], described(final, index)[2])
+
+
+def _of_its_size(cause: Cause, numbers: Mapping[str, Number]) -> float:
     """How sure a name can be at the most whose size these data do not tell: such a shape stands for something else."""
-    size = final.structure.causes[index].amplitude
-    _, _, numbers = described(final, index)
+    size = cause.amplitude
     if size is None or size.fixed or size.name not in numbers:
         return 1.0
     number = numbers[size.name]
