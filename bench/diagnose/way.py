@@ -5,36 +5,41 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bench.identify.motion import holds
 
 if TYPE_CHECKING:
     from .data import Data
 
-LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich
+LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich which come back
+LEAST = 0.05  # of the travel: less is no way, nor another level
 TOLD_ONCE = 0.5  # how sure a name can be of what acts with the motion, where data are not rich
 
 
 def is_rich(data: Data) -> bool:
-    """Whether a measurement holds several depths, or passes over its depth several times."""
+    """Whether a measurement comes back, and holds several depths or passes over its depth several times."""
     counted = data.weight > 0
     x = data.position_mm
     span = float(np.ptp(x[counted])) if counted.any() else 0.0
-    if span <= 0.0:
+    if span <= 0.0 or _passes(x, LEAST * span) < 2:
         return False
     levels: list[float] = []
     for s in holds(data.time_s, x):
         level = float(np.mean(x[s]))
-        if level > 0.05 * span and all(abs(level - other) > 0.05 * span for other in levels):
+        if level > LEAST * span and all(abs(level - other) > LEAST * span for other in levels):
             levels.append(level)
-    if len(levels) >= LEVELS:
-        return True
-    passes, way, end = 0, 0, float(x[0])
-    for value in x[:: max(len(x) // 5000, 1)].tolist():
+    return len(levels) >= LEVELS or _passes(x, 0.5 * span) >= PASSES
+
+
+def _passes(position_mm: NDArray[np.float64], least_mm: float) -> int:
+    """How often the motion goes one way by more than `least_mm`, before it goes back by as much."""
+    passes, way, end = 0, 0, float(position_mm[0])
+    for value in position_mm[:: max(len(position_mm) // 5000, 1)].tolist():
         if way >= 0 and value > end or way <= 0 and value < end:
-            if way == 0 and abs(value - end) > 0.5 * span:
+            if way == 0 and abs(value - end) > least_mm:
                 way, passes = (1 if value > end else -1), passes + 1
             end = value if way else end
-        elif abs(value - end) > 0.5 * span:
+        elif abs(value - end) > least_mm:
             way, passes, end = -way, passes + 1, value
-    return passes >= PASSES
+    return passes

@@ -32,10 +32,11 @@ def data(levels_mm: list[float], hold_s: float = 1.0) -> Data:
         ([2.0, 0.0], False),
         ([2.0, 1.99, 2.0, 1.99, 2.0], False),
         ([2.0, 0.0, 2.0, 0.0, 2.0], True),
-        ([0.5, 1.0, 1.5, 2.0], True),
+        ([0.5, 1.0, 1.5, 2.0], False),
+        ([0.5, 1.0, 1.5, 2.0, 0.0], True),
     ],
 )
-def test_several_depths_held_or_passes_make_data_rich(levels_mm, rich):
+def test_several_depths_held_or_passes_make_data_rich_that_come_back(levels_mm, rich):
     assert is_rich(data(levels_mm)) is rich
 
 
