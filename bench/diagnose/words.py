@@ -145,9 +145,9 @@ def warnings(d: Diagnosis) -> list[str]:
     if not d.seen_once:
         return []
     return [
-        f"the run never comes back, or presses fewer than {PASSES // 2} times and holds at fewer than {LEVELS} depths: what"
-        " acts with the motion cannot be told from a pad that is stranger than its law there, and no such name is more"
-        f" than {percent(TOLD_ONCE)} sure (press and return more often, or hold at more depths)"
+        f"the run never comes back, or presses fewer than {PASSES // 2} times and holds at fewer than {LEVELS} depths:"
+        " what acts with the motion cannot be told from a pad that is stranger than its law there, and no such name is"
+        f" more than {percent(TOLD_ONCE)} sure (press and return more often, or hold at more depths)"
     ]
 
 
