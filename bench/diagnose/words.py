@@ -7,7 +7,7 @@ import math
 from sim.effects import all_effects
 
 from .result import Alternative, CauseFound, Diagnosis
-from .way import LEVELS, PASSES, TOLD_ONCE
+from .way import LEVELS, TOLD_ONCE
 
 NAMES = {
     "adhesion": "adhesion",
@@ -87,7 +87,9 @@ def verdict(d: Diagnosis) -> str:
             f"{what} explains these data down to their noise" if not in_air(d) else f"{what} adds nothing to the noise"
         )
     if d.verdict == "explained":
-        return f"What {'the bench adds' if in_air(d) else 'the model gets wrong'} is explained by {named(d)}"
+        doubted = any(max(c.confidence, c.of_its_kind) <= TOLD_ONCE for c in d.causes)
+        told = "can be explained by" if doubted else "is explained by"
+        return f"What {'the bench adds' if in_air(d) else 'the model gets wrong'} {told} {named(d)}"
     if d.causes:
         verb = "takes" if len(d.causes) == 1 else "take"
         return f"Unexplained: {named(d)} {verb} {percent(1 - d.left)} of the error, no known cause the rest"
@@ -145,9 +147,9 @@ def warnings(d: Diagnosis) -> list[str]:
     if not d.seen_once:
         return []
     return [
-        f"the run never comes back, or presses fewer than {PASSES // 2} times and holds at fewer than {LEVELS} depths:"
-        " what acts with the motion cannot be told from a pad that is stranger than its law there, and no such name is"
-        f" more than {percent(TOLD_ONCE)} sure (press and return more often, or hold at more depths)"
+        f"the run never comes back, or goes to and fro less than twice and holds at fewer than {LEVELS} depths: what"
+        " acts with the motion cannot be told from a pad that is stranger than its law there, and no such name is more"
+        f" than {percent(TOLD_ONCE)} sure (press and return more often, or hold at more depths)"
     ]
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from bench.diagnose.result import Number
-from bench.diagnose.words import NAMES, headline, lines, name_of, percent
+from bench.diagnose.words import NAMES, headline, lines, name_of, percent, verdict
 from sim.effects import all_effects
 from tests.bench.diagnose.small import PAD, made_up
 
@@ -32,8 +32,17 @@ def test_what_how_big_how_sure_and_what_to_check():
     assert "goes with the speed" in said and "course of the run" not in said, "only what passed is told"
 
 
+def test_an_explanation_under_a_doubtful_name_is_one_that_can_be():
+    d = made_up()
+    assert verdict(d) == "What the model gets wrong is explained by friction"
+    doubted = made_up(causes=[replace(d.causes[0], confidence=0.5)])
+    assert verdict(doubted) == "What the model gets wrong can be explained by friction"
+    late = made_up(causes=[replace(d.causes[0], confidence=0.4, of_its_kind=0.98)])
+    assert verdict(late) == "What the model gets wrong is explained by friction"
+
+
 def test_where_depths_are_met_once_the_doubt_and_the_cure_are_told():
-    assert "pass" not in "\n".join(lines(made_up()))
+    assert "comes back" not in "\n".join(lines(made_up()))
     said = "\n".join(lines(made_up(seen_once=True)))
     assert "no such name is more than 50 % sure" in said and "hold at more depths" in said
 
