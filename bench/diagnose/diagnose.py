@@ -38,6 +38,7 @@ from .spread import covariance
 from .swing import Swing
 from .swing import find as swinging
 from .verdict import chain, excesses, explains, found, ordered, seen, sureness, told_size, without
+from .way import most_sure
 from .write import model_of
 
 Array = NDArray[np.float64]
@@ -183,11 +184,10 @@ def _doubtful(
     named = [c.id for c in fits[-1].structure.causes[len(fits[0].structure.causes) :]]
     for k in range(len(fits) - 1, 1, -1):
         _, confidence, kind = sureness(path, named[k - 1], named)
-        taken = excess[k - 1] - excess[k]
         sure = max(confidence, kind)
-        if sure < DOUBTED and taken < min(LITTLE * (excess[0] + apart), excess[-1] - slow[k - 1]):
+        if sure < DOUBTED and _takes_little(excess, k, excess[0] + apart, slow[k - 1]):
             return k - 1
-        trace = TRACE * excess[0]
+        taken, trace = excess[k - 1] - excess[k], TRACE * excess[0]
         if sure < NAMED and taken < min(trace, FAINT * floor_N**2) and taken + excess[-1] < 2.0 * trace:
             return k - 1
     return None
@@ -255,10 +255,14 @@ def _untold(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     none."""
     own = len(fits[0].structure.causes)
     for k in range(len(fits) - 1, 1, -1):
-        taken = excess[k - 1] - excess[k]
-        if taken < min(LITTLE * excess[0], excess[-1]) and told_size(whole, own + k - 1) < DOUBTED:
+        if _takes_little(excess, k, excess[0]) and told_size(whole, own + k - 1) < DOUBTED:
             return k - 1
     return None
+
+
+def _takes_little(excess: list[float], step: int, scale: float, slow: float = 0.0) -> bool:
+    """Whether a step of the chain takes little of `scale`, and less than is left beside what is `slow` (all N²)."""
+    return excess[step - 1] - excess[step] < min(LITTLE * scale, excess[-1] - slow)
 
 
 def _spread(prepared: Prepared, data: Data, fit: Fit) -> Fit:
@@ -387,7 +391,7 @@ def _concluded(
         notes=list(m.notes),
         remainders=tests,
         name=m.name,
-        seen_once=not search.reach.rich and any(all_effects()[c.id].of_motion for c in causes),
+        seen_once=any(most_sure(all_effects()[c.id], search.reach.rich) < 1.0 for c in causes),
         time_s=full.time_s[at],
         position_mm=full.position_mm[at],
         force_N=raw.force_N[at],

@@ -16,7 +16,7 @@ from .path import Measure, Path, Trial
 from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
 from .search import Search
-from .way import TOLD_ONCE
+from .way import most_sure
 
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
@@ -170,7 +170,7 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
         id_, form, numbers = described(final, own + k)
         cause = final.structure.causes[own + k]
         values = {name: number.value for name, number in numbers.items()}
-        most = min(_of_its_size(cause, numbers), 1.0 if search.reach.rich or not cause.effect.of_motion else TOLD_ONCE)
+        most = min(_of_its_size(cause, numbers), most_sure(cause.effect, search.reach.rich))
         confidence, kind = min(confidence, most), min(kind, most)
         out.append(
             CauseFound(

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from bench.identify.motion import holds
 
 if TYPE_CHECKING:
+    from sim.effects.base import Effect
+
     from .data import Data
 
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich which come back
@@ -30,6 +32,11 @@ def is_rich(data: Data) -> bool:
         if level > LEAST * span and all(abs(level - other) > LEAST * span for other in levels):
             levels.append(level)
     return len(levels) >= LEVELS or _passes(x, 0.5 * span) >= PASSES
+
+
+def most_sure(effect: Effect, rich: bool) -> float:
+    """How sure the name of an effect can be at the most. `rich`: whether the data are, or none is of a pad."""
+    return 1.0 if rich or not effect.of_motion else TOLD_ONCE
 
 
 def _passes(position_mm: NDArray[np.float64], least_mm: float) -> int:

@@ -106,9 +106,9 @@ def bursts(dt: float, force: float, state: State, p: State) -> float:
 
 def _while_fed(values: Mapping[str, float]) -> tuple[float, ...]:
     """What `bursts` reads."""
-    waves, fed = round(values["waves"]), min(round(values["fed"]), round(values["waves"]))
-    most = values["amplitude"] * waves / fed
-    return (most, values["frequency"], values["phase"], float(waves), float(fed), float(round(values["first"])))
+    waves, first = float(round(values["waves"])), float(round(values["first"]))
+    fed = min(float(round(values["fed"])), waves)
+    return (values["amplitude"] * waves / fed, values["frequency"], values["phase"], waves, fed, first)
 
 
 @block

@@ -116,19 +116,20 @@ def _fractional(pad: Pad, values: Mapping[str, float]) -> Pad:
     return _with_modes(pad, shares, [float(values["rate"] * k) for k in rates])
 
 
-def _consolidation(pad: Pad, values: Mapping[str, float]) -> Pad:
-    odd = 2.0 * np.arange(NODES) + 1.0
-    weights = 8.0 / (math.pi * odd) ** 2
+def _diffusion(pad: Pad, values: Mapping[str, float], first: float, step: float) -> Pad:
+    """With first/π² Σ e^(−n² rate t)/n² over n = 1, 1 + step, …"""
+    n = step * np.arange(NODES) + 1.0
+    weights = first / (math.pi * n) ** 2
     weights[-1] += 1.0 - weights.sum()
-    shares = [float(values["share"] * w) for w in weights]
-    return _with_modes(pad, shares, [float(values["rate"] * k) for k in odd**2])
+    return _with_modes(pad, [float(values["share"] * w) for w in weights], [float(values["rate"] * k) for k in n**2])
+
+
+def _consolidation(pad: Pad, values: Mapping[str, float]) -> Pad:
+    return _diffusion(pad, values, first=8.0, step=2.0)
 
 
 def _sphere(pad: Pad, values: Mapping[str, float]) -> Pad:
-    n = 1.0 + np.arange(NODES)
-    weights = 6.0 / (math.pi * n) ** 2
-    weights[-1] += 1.0 - weights.sum()
-    return _with_modes(pad, [float(values["share"] * w) for w in weights], [float(values["rate"] * k) for k in n**2])
+    return _diffusion(pad, values, first=6.0, step=1.0)
 
 
 def _gel(pad: Pad, values: Mapping[str, float]) -> Pad:
