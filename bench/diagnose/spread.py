@@ -11,12 +11,18 @@ from numpy.typing import NDArray
 from bench.identify.uncertainty import sandwich
 
 from .data import Data
-from .refit import Fit, chi2, errors, jacobian
-from .shapes import families, scores, stand_in
+from .numbers import Coordinate
+from .refit import Fit, chi2, errors, jacobian, reduced, refit
+from .shapes import Member, families, scores, stand_in
 
 Array = NDArray[np.float64]
 
 UNKNOWN = 1.0  # variance of a logarithm with which nothing in the data moves
+INEXACT = 0.02  # of what a cause takes, that its true shape may be from the nearest of its family
+FAR = (
+    0.25  # of a number, that a shape which fits worse counts as being away at the most: further, it means another thing
+)
+STEPS_WITHOUT, NEARLY = 8, 1e-5  # of the fit without a cause, and of χ², that a step of it must promise
 STEPS = np.geomspace(1e-4, 1.0, 25)  # of a number about which χ² is flat
 WIDEST = 1e6  # times the variance that the stand-in tells
 
@@ -78,15 +84,20 @@ def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
     """What the choice among shapes that the data cannot tell apart adds to the variances of x (P,).
 
     Each shape of a cause's family weighs as its χ² tells it (K. P. Burnham, D. R. Anderson, Model Selection and
-    Multimodel Inference, 2nd ed., Springer, 2002, section 4.3, with Schwarz's weights). A shape whose numbers the data
-    cannot tell says no more about another's than that one itself does.
+    Multimodel Inference, 2nd ed., Springer, 2002, section 4.3, with Schwarz's weights). By these the first shape counts
+    alone as soon as there is little noise. But no shape of a family is the true one: the nearest may be off by a share
+    of what the cause does, and a difference of that order in χ² tells nothing (such discrepancy between a model and the
+    world: M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, J. R. Stat. Soc. B 63, 2001, 425–464). By
+    weights of that kind the variance is at least so much. A shape whose numbers the data cannot tell says no more about
+    another's than that one itself does.
     """
     out = np.zeros(len(fit.x))
     lead, kept = stand_in(short, fit)
     every = fit.structure.values(fit.x)
-    for place, members in zip(kept, families(short, lead, range(len(kept))), strict=True):
-        weight = _weights(scores(short, members))
-        leading, at = members[0].variances, fit.structure.of_cause(place)
+    for index, members in enumerate(families(short, lead, range(len(kept)))):
+        place, bare = kept[index], refit(short, *reduced(lead, index), STEPS_WITHOUT, NEARLY)
+        plain, rough = _weights(scores(short, [*members, Member(bare, -1)]))
+        at = fit.structure.of_cause(place)
         for position, p in zip(range(at.start, at.stop), fit.structure.causes[place].fitted, strict=True):
             c = fit.structure.coordinates[position]
             if not p.required:
@@ -94,21 +105,32 @@ def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
             if own[position] == 0.0 and c.logarithmic and c.lower < fit.x[position] < c.upper:
                 out[position] = UNKNOWN
                 continue
-            told = leading[p.name]  # 0: the stand-in says nothing of it
+            told = members[0].variances[p.name]  # 0: the stand-in says nothing of it
             wider = min(max(float(own[position]) / told, 1.0), WIDEST) if told > 0.0 else 1.0
-            here = every[place][p.name]
-            for w, m in zip(weight[1:], members[1:], strict=True):
-                if p.name not in m.variances:  # a choice of that form, which knows no such number
-                    out[position] += w * UNKNOWN
-                    continue
-                there = m.values[p.name]
-                away = np.log(max(there, 1e-300) / here) if c.logarithmic else (there - here) / c.unit
-                more = min(max(wider * m.variances[p.name] - own[position], 0.0), own[position])
-                out[position] += w * float(away**2 + more)
+            away = [_away(m, p.name, every[place][p.name], c, wider, float(own[position])) for m in members[1:]]
+            as_told = sum(w * (step**2 + more) for w, (step, more, _) in zip(plain[1:], away, strict=True))
+            inexact = sum(
+                w * (min(step, far) ** 2 + more) for w, (step, more, far) in zip(rough[1:], away, strict=True)
+            )
+            out[position] = max(as_told, inexact)
     return out
 
 
-def _weights(score: Array) -> Array:
-    """How much each shape counts."""
-    weight = np.exp(-0.5 * (score - score.min()))
-    return np.asarray(weight / weight.sum())
+def _away(
+    member: Member, name: str, here: float, c: Coordinate, wider: float, own: float
+) -> tuple[float, float, float]:
+    """How far off a number is in another shape, by how much its variance there is more, and how far it counts as being
+    off at the most where that shape fits worse, all in the coordinate."""
+    far = FAR if c.logarithmic else FAR * abs(here) / c.unit
+    if name not in member.variances:  # a choice of that form, which knows no such number
+        return float(np.sqrt(UNKNOWN)), 0.0, far
+    there = member.values[name]
+    step = np.log(max(there, 1e-300) / here) if c.logarithmic else (there - here) / c.unit
+    return abs(float(step)), min(max(wider * member.variances[name] - own, 0.0), own), far
+
+
+def _weights(score: Array) -> tuple[Array, Array]:
+    """How much each shape counts if one of them is true, and if none is; the last score is that without the cause."""
+    above = score[:-1] - score.min()
+    plain, inexact = (np.exp(-0.5 * above / t) for t in (1.0, 1.0 + INEXACT * (score[-1] - score.min())))
+    return np.asarray(plain / plain.sum()), np.asarray(inexact / inexact.sum())

@@ -100,6 +100,33 @@ def test_shapes_that_serve_as_well_widen_what_is_stated() -> None:
     assert abs(value - true) < 2 * abs(stated(wide, "rate")[1])
 
 
+SHAPES_OF_OTHERS = [  # (cause, shape of the truth, nearest of the family's, number)
+    ("depth_dependent_relaxation", "zhurkov", "hyperbolic", "slope"),
+    ("damage", "power", "exponential", "rate"),
+    ("frame_compliance", "hertz_joint", "stiffening", "compliance"),
+    ("stress_softening", "ratio", "ratio", "share"),
+    ("friction", "bristle", "coulomb", "coulomb"),
+]
+
+
+def test_numbers_of_a_shape_that_is_none_of_the_familys_are_as_sure_as_is_stated() -> None:
+    """Of the numbers of fifteen cases hardly one in three is off by more than two of the deviations stated, though most
+    are by the noise's alone; and four in five are still told to a quarter."""
+    beyond_narrow, beyond_wide, of_it = 0, 0, []
+    for id, shape, form, name in SHAPES_OF_OTHERS:
+        for seed in (1, 2, 3):
+            c, p, fit = fitted(id, shape, form, 1.5, seed)
+            true = c.truth.parameters[id][name]
+            value, narrow = stated(replace(fit, spread=of_the_noise(p.full, fit)), name)
+            _, wide = stated(replace(fit, spread=covariance(p.full, p.short, fit)), name)
+            assert narrow <= wide
+            of_it.append(wide / abs(value))
+            beyond_narrow += abs(value - true) > 2 * narrow
+            beyond_wide += abs(value - true) > 2 * wide
+    assert beyond_narrow >= 9 and beyond_wide <= 5
+    assert np.quantile(of_it, 0.8) < 0.25
+
+
 def test_a_shape_as_far_from_its_family_as_can_be_is_another_causes() -> None:
     """A bias of which this much goes with the position is a spring; one of which nothing does is a bias."""
     _, _, fit = fitted("force_bias", "constant", "along")
@@ -131,9 +158,11 @@ def test_a_number_of_which_the_stand_in_says_nothing_widens_none(monkeypatch):
         lead, other = (SimpleNamespace(variances={"coulomb": v}, values={"coulomb": 1.5}) for v in (told, 1e-3))
         monkeypatch.setattr(spread, "stand_in", lambda short, fit: (fit, [0]))
         monkeypatch.setattr(spread, "families", lambda short, lead, kept, pair=(lead, other): [list(pair)])
-        monkeypatch.setattr(spread, "scores", lambda short, members: np.zeros(2))
+        monkeypatch.setattr(spread, "scores", lambda short, members: np.zeros(3))
+        monkeypatch.setattr(spread, "reduced", lambda lead, index: (structure, np.ones(0)))
+        monkeypatch.setattr(spread, "refit", lambda *args: fit)
         added = spread._of_the_shapes(None, fit, np.array([np.float64(1e250)]))
-        assert np.isfinite(added).all() and added[0] >= 0.5 * 0.5**2
+        assert np.isfinite(added).all() and added[0] >= 0.5 * spread.FAR**2
 
 
 def test_a_number_about_which_the_cost_only_jumps_has_a_standard_error(monkeypatch):
