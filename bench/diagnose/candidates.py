@@ -6,7 +6,7 @@ residual; it is only a start: a candidate is judged by a joint refit.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -72,6 +72,17 @@ def narrowed(form: Form, reach: Reach) -> Form:
     return replace(form, parameters=tuple(_narrowed(p, reach, longest_mm) for p in form.parameters))
 
 
+def longer(form: Form, than_mm: float, travel_mm: float) -> Form:
+    """The form with periods longer than one, up to the longest that repeats over the travel."""
+    to_mm = LONGEST_PERIOD * travel_mm
+    return replace(
+        form,
+        parameters=tuple(
+            _within(p, than_mm, to_mm, p.starts, p.if_left_out) if p.name == "period" else p for p in form.parameters
+        ),
+    )
+
+
 def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     lower, upper, starts, default = p.lower, p.upper, p.starts, p.if_left_out
     if p.unit == "1/s" and p.logarithmic:
@@ -119,6 +130,11 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     elif p.name == "slip_force":
         lower, upper = 0.005 * reach.force_N, reach.force_N
         starts = tuple(share * reach.force_N for share in (0.03, 0.1))
+    return _within(p, lower, upper, starts, default)
+
+
+def _within(p: Parameter, lower: float, upper: float, starts: Sequence[float], default: float) -> Parameter:
+    """A parameter between other bounds, where there is anything between them."""
     if lower >= upper:
         return p
     starts = tuple(v for v in starts if lower <= v <= upper)
@@ -287,6 +303,7 @@ def _rippling(signatures: Signatures, effect: Effect, cause: Cause, most: int) -
         return signatures.waves[key]
 
     out = []
+    most = 1 if ripple.two_periods(cause.form) else most
     for values, promise in ripple.starts(cause.form, column, signatures.residual, most):
         size = min(max(values["amplitude"], 0.05 * amplitude.typical), 5 * amplitude.typical)
         values["amplitude"] = _inside(size, amplitude.lower, amplitude.upper)

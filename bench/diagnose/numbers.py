@@ -203,6 +203,10 @@ class Structure:
         """One more cause."""
         return replace(self, causes=(*self.causes, cause))
 
+    def with_cause_at(self, index: int, cause: Cause) -> Structure:
+        """Another cause in a place."""
+        return replace(self, causes=(*self.causes[:index], cause, *self.causes[index + 1 :]))
+
     def x(self, pad_x: Array, causes: Sequence[Mapping[str, float]] | None = None, tail: Array | None = None) -> Array:
         """The vector of a pad's own vector, the causes' values (their starts where not given) and the run's own end."""
         values = list(causes) if causes is not None else [c.start for c in self.causes]

@@ -1,6 +1,6 @@
 """Where to start what repeats with the position: every period, with the phases and harmonics that fit the residual.
 
-For a given period a sine and its second harmonic are linear in four numbers, so that only the period is scanned.
+For given periods a sine and a second one are linear in four numbers, so that only periods are scanned.
 """
 
 from __future__ import annotations
@@ -19,12 +19,17 @@ Array = NDArray[np.float64]
 
 PERIODS = 36
 TURNS = 24  # parts of a period
-RATIO = 2.5  # of the second harmonic to the first at the most, to start with
+RATIO = 2.5  # of the second sine to the first at the most, to start with
 
 
 def ripples(form: Form) -> bool:
     """Whether a form repeats with the position."""
     return {"period", "phase"} <= {p.name for p in form.parameters}
+
+
+def two_periods(form: Form) -> bool:
+    """Whether a form repeats in two ways, of which one has so many waves for each of the other."""
+    return ripples(form) and any(p.name == "order" for p in form.parameters)
 
 
 def turned(cause: Cause) -> list[Cause]:
@@ -33,7 +38,7 @@ def turned(cause: Cause) -> list[Cause]:
     for turn in np.linspace(0.0, 2.0 * np.pi, TURNS, endpoint=False):
         phases = {"phase": cause.start["phase"] + turn}
         if "second_phase" in cause.start:
-            phases["second_phase"] = cause.start["second_phase"] + 2.0 * turn
+            phases["second_phase"] = cause.start["second_phase"] + cause.start.get("order", 2.0) * turn
         out.append(cause.with_start(**{name: float(np.mod(value, 2.0 * np.pi)) for name, value in phases.items()}))
     return out
 
@@ -47,36 +52,52 @@ def starts(
     what the pad can imitate; `residual` (n,) likewise.
     """
     period = next(p for p in form.parameters if p.name == "period")
-    second = any(p.name == "ratio" for p in form.parameters)
     lowest, highest = 1.0 / period.upper, 1.0 / period.lower
     step = lowest / math.ceil(lowest * PERIODS / max(highest - lowest, 1e-9 * highest))
     waves = range(round(lowest / step), int(highest / step) + 1)
-    every = {*waves, *(2 * k for k in waves if second)}
+    every = sorted({wave for pair in _combined(form, waves) for wave in pair if wave})
     pairs = {k: [column(1.0 / (k * step), phase) for phase in (0.0, 0.5 * math.pi)] for k in every}
+    at = {k: slice(2 * i, 2 * i + 2) for i, k in enumerate(pairs)}
+    columns = np.stack([column for pair in pairs.values() for column in pair], axis=1)
+    norm = np.linalg.norm(columns, axis=0)
+    usable = np.isfinite(norm) & (norm > 1e-9)
+    columns = np.where(usable, columns, 0.0)
+    gram, along = columns.T @ columns, np.sum(columns * residual[:, None], axis=0)
     found = []
-    for k in waves:
-        columns = np.stack([*pairs[k], *(pairs[2 * k] if second else ())], axis=1)
-        norm = np.linalg.norm(columns, axis=0)
-        if not np.isfinite(norm).all() or norm.min() <= 1e-9:
-            continue
-        along = np.sum(columns * residual[:, None], axis=0)
-        sizes = np.linalg.lstsq(columns.T @ columns, along, rcond=1e-10)[0]
-        found.append((float(sizes @ along), k, sizes))
+    for k, other in _combined(form, waves):
+        of = np.r_[at[k], at[other]] if other else np.r_[at[k]]
+        if usable[of].all():
+            sizes = np.linalg.lstsq(gram[np.ix_(of, of)], along[of], rcond=1e-10)[0]
+            found.append((float(sizes @ along[of]), k, other, sizes))
     found.sort(key=lambda one: -one[0])
     taken: list[int] = []
-    for promise, k, sizes in found:
-        if len(taken) < most and all(abs(k - other) > 1 for other in taken):
+    for promise, k, other, sizes in found:
+        if len(taken) < most and all(abs(k - before) > 1 for before in taken):
             taken.append(k)
             # just inside the bounds, at which an extreme period would stay
             near = min(max(1.0 / (k * step), 1.02 * period.lower), 0.98 * period.upper)
-            yield {"period": near, **_waves(sizes)}, promise
+            order = {"order": other / k} if two_periods(form) else {}
+            yield {"period": near, **_waves(sizes, form), **order}, promise
 
 
-def _waves(sizes: Array) -> dict[str, float]:
-    """Amplitude and phase of a sin θ + b cos θ, and ratio and phase of the second harmonic."""
+def _combined(form: Form, waves: range) -> Iterator[tuple[int, int]]:
+    """Waves over the longest way for each that a form may have, with those of its second sine; 0: it has none."""
+    named = {p.name: p for p in form.parameters}
+    for k in waves:
+        if two_periods(form):
+            order = named["order"]
+            shorter = range(waves.start, 2 * waves.stop)
+            yield from ((k, other) for other in shorter if order.lower < other / k < order.upper)
+        else:
+            yield k, 2 * k if "ratio" in named else 0
+
+
+def _waves(sizes: Array, form: Form) -> dict[str, float]:
+    """Amplitude and phase of a sin θ + b cos θ, and ratio and phase of the second sine."""
     amplitude = float(np.hypot(sizes[0], sizes[1]))
     out = {"amplitude": amplitude, "phase": float(np.arctan2(sizes[1], sizes[0]))}
     if len(sizes) > 2:
+        most = next(min(RATIO, 0.9 * p.upper) for p in form.parameters if p.name == "ratio")
         ratio = float(np.hypot(sizes[2], sizes[3])) / max(amplitude, 1e-300)
-        out |= {"ratio": min(ratio, RATIO), "second_phase": float(np.arctan2(sizes[3], sizes[2]))}
+        out |= {"ratio": min(ratio, most), "second_phase": float(np.arctan2(sizes[3], sizes[2]))}
     return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -11,20 +11,23 @@ from numpy.typing import NDArray
 
 from sim.effects import Form
 
-from .candidates import CHANNEL, Reach, combinations, narrowed
+from .candidates import CHANNEL, Reach, Signatures, combinations, longer, narrowed, starts
 from .data import Data
 from .modes import NAMED as MISSING
 from .modes import as_believed, missing_told
 from .numbers import Structure, cause_of
-from .refit import Fit, force_at, refit
+from .refit import Fit, force_at, reduced, refit
+from .ripple import ripples
 
 Array = NDArray[np.float64]
 
 STEPS, STARTS = 8, 12  # of the fit of another shape
+LONGER = 6  # starts with longer periods, of each shape
 FEW, TRIED = 3, 2  # steps of the best starts
 NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
 AS_GOOD = 4.0  # Δχ² by which one that is near to what was believed may be worse
+LEFT = 1.03  # times the noise power: what leaves more may have a period beyond those sought
 EDGE = 1e-6  # within which a coordinate is at its bound
 WORKERS = 2
 
@@ -105,7 +108,36 @@ def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
             if not departed(other, index):
                 taken = other
                 break
+        taken = _longer(short, taken, index)
     return fit if taken is lead else taken
+
+
+def _longer(short: Data, fit: Fit, index: int) -> Fit:
+    """The fit with a longer period than was sought for a cause that repeats with the position, where its own is at the
+    bound or leaves something: while other causes may stand first a long one is another law, and no more."""
+    structure, values = fit.structure, fit.structure.values(fit.x)
+    cause, entries = structure.causes[index], float(np.count_nonzero(short.weight > 0))
+    if not ripples(cause.form):
+        return fit
+    k = structure.of_cause(index).start + [p.name for p in cause.fitted].index("period")
+    if fit.x[k] < structure.upper[k] - EDGE and fit.chi2 < LEFT * max(entries - fit.free, 1.0):
+        return fit
+    effect, period_mm, travel_mm = cause.effect, values[index]["period"], float(np.ptp(short.position_mm))
+
+    def carried(form: Form, start: Mapping[str, float], pad: Array, steps: int) -> Fit:
+        own = cause_of(effect, longer(form, 0.5 * period_mm, travel_mm), start)
+        joined = structure.with_cause_at(index, own)
+        x = joined.x(pad, [*values[:index], own.start, *values[index + 1 :]], fit.of_run)
+        return refit(short, joined, x, steps, NEARLY)
+
+    bare = refit(short, *reduced(fit, index), END, 1e-8)
+    signatures, end = Signatures(short, bare), len(structure.pad.coordinates)
+    found = [fit, carried(cause.form, values[index], fit.x[:end], END)]
+    for form in [f for f in effect.forms if f.sought]:
+        begun = starts(signatures, effect, longer(form, 1.02 * period_mm, travel_mm), LONGER)
+        tried = sorted((carried(form, s.cause.start, bare.x[:end], STEPS) for s in begun), key=lambda f: f.chi2)
+        found += [refit(short, f.structure, f.x, END, 1e-8) for f in tried[: LONGER // 2]]
+    return found[int(np.argmin(scores(short, [Member(f, index) for f in found])))]
 
 
 def departed(fit: Fit, index: int) -> bool:
@@ -134,7 +166,7 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     begun: list[tuple[float, Structure, Array]] = []
     for started in [{}, *others]:
         own = cause_of(cause.effect, shape, told | started)
-        joined = replace(structure, causes=(*structure.causes[:index], own, *structure.causes[index + 1 :]))
+        joined = structure.with_cause_at(index, own)
         x = joined.x(pad, [*values[:index], own.start, *values[index + 1 :]], lead.of_run)
         force = force_at(short, joined, x)
         if not np.isfinite(force).all():

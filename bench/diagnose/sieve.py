@@ -15,12 +15,12 @@ from sim.effects import Effect, Form
 from .candidates import Reach, Signatures, Start, forms, starts
 from .dashpot import instead_of_a_mode
 from .data import Data, Prepared
-from .evidence import penalty, unexplained
+from .evidence import believable, penalty, unexplained
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .path import Trial
 from .refit import Fit, extended, force_at, jacobian, refit
-from .ripple import ripples
+from .ripple import ripples, two_periods
 from .spectrum import one_more_mode
 from .way import is_rich
 
@@ -123,7 +123,8 @@ class Sieve:
             if best is not None:
                 again = pool.map(lambda trials: self._relaxing_as(best, min(trials, key=lambda t: t.score)), ended)
                 ended = [[*trials, *new] for trials, new in zip(ended, again, strict=True)]
-        found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in [*ended, *wide[third:]]]
+        families = [self._of_one_period(t) for t in [*ended, *wide[third:]]]
+        found_all = [self._plainest(sorted(t, key=lambda t: t.score)) for t in families]
         found_all += [sieved[i][0] for i in order[second:]]
         found_all.sort(key=lambda t: t.score)
         ranked = sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score)
@@ -203,11 +204,13 @@ class Sieve:
     ) -> list[Trial]:
         """A few steps from the most promising starts of an id, and once more with the pad as it was believed."""
         found = sorted(found, key=lambda s: -s.promise)
+        # with two periods a ripple promises the most, and takes no other's place
+        most = STARTS + sum(two_periods(s.cause.form) for s in found)
         chosen = [s for s in found if np.isinf(s.promise)]
         forms_seen: dict[str, int] = {}
         for s in found:
             seen = forms_seen.get(s.cause.form.name, 0)
-            if np.isfinite(s.promise) and seen < 2 and sum(forms_seen.values()) < STARTS:
+            if np.isfinite(s.promise) and seen < 2 and sum(forms_seen.values()) < most:
                 forms_seen[s.cause.form.name] = seen + 1
                 chosen.append(s)
         joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen if s.pad is None]
@@ -274,6 +277,12 @@ class Sieve:
             if before - trial.fit.chi2 < MUCH * before:
                 break
         return trial
+
+    def _of_one_period(self, trials: list[Trial]) -> list[Trial]:
+        """The trials of a family without a second period where that one's numbers end at their bounds: it must not cost
+        the others their place."""
+        kept = [t for t in trials if not two_periods(t.cause.form) or believable(t.fit, self.prepared)]
+        return kept or trials
 
     def _plainest(self, trials: list[Trial]) -> Trial:
         """The best; or a form of fewer numbers that is as good for what there is to explain."""

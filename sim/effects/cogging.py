@@ -27,7 +27,7 @@ from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.stamps import AT_TIME
-from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC, phase
+from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC, SECOND_PERIOD
 from sim.jit import State, block
 
 
@@ -182,15 +182,7 @@ EFFECT = Effect(
         Form(
             name="two_periods",
             what="two sines whose periods are no multiple of each other",
-            parameters=(
-                _AMPLITUDE,
-                _PERIOD,
-                PHASE,
-                Parameter("ratio", "1", 0.0, 1.0, 0.3, "second amplitude over the first"),
-                Parameter("order", "1", 1.2, 4.0, 1.5, "waves of the second for each of the first", starts=(1.3, 1.6)),
-                phase("second_phase", "phase of the second at position 0"),
-            ),
-            sought=False,
+            parameters=(_AMPLITUDE, _PERIOD, PHASE, *SECOND_PERIOD),
             blocks={"probe": two_periods},
         ),
         Form(

@@ -4,6 +4,8 @@
 - `harmonics`: with a second harmonic, ratio · amplitude. Unequal offsets of the two quadrature signals make the first
   harmonic, unequal gains and a phase other than 90° the second (P. L. M. Heydemann, Determination and correction of
   quadrature fringe measurement errors in interferometers, Appl. Opt. 20, 1981, 3382–3384).
+- `two_periods`: with a second sine of `order` waves for each of the first, which need not be whole: the balls of a
+  screw beside its lead, the pole pitch of a motor beside that of its scale.
 - `fading`: the sine fades or grows along the way, where the head is not parallel to its scale: amplitude ·
   (1 + growth (true − at_depth)), within 0 and twice the amplitude.
 - `leaning`: the sine grows or fades with a power of the depth, as the bracket of a head bends under the load:
@@ -21,7 +23,7 @@ import math
 from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
-from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC
+from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC, SECOND_PERIOD
 from sim.jit import State, block
 
 _STEEPEST = 0.9
@@ -39,6 +41,13 @@ def harmonics(dt: float, x: float, state: State, p: State) -> float:
     """Reported position; p = (amplitude, wave number, phase, ratio, second phase)."""
     angle = p[1] * x
     return x + p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(2.0 * angle + p[4]))
+
+
+@block
+def two_periods(dt: float, x: float, state: State, p: State) -> float:
+    """Reported position; p = (amplitude, wave number, phase, ratio, order, second phase)."""
+    angle = p[1] * x
+    return x + p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(p[4] * angle + p[5]))
 
 
 @block
@@ -83,6 +92,12 @@ def _packed_fading(values: Mapping[str, float]) -> tuple[float, ...]:
     growth = values["growth"]
     amplitude = min(values["amplitude"], _STEEPEST / (2.0 * wave_number + abs(growth)))
     return (amplitude, wave_number, values["phase"], growth, values["at_depth"])
+
+
+def _packed_two_periods(values: Mapping[str, float]) -> tuple[float, ...]:
+    wave_number, ratio, order = 2.0 * math.pi / values["period"], values["ratio"], values["order"]
+    amplitude = min(values["amplitude"], _STEEPEST / (wave_number * (1.0 + order * ratio)))
+    return (amplitude, wave_number, values["phase"], ratio, order, values["second_phase"])
 
 
 def _packed(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -134,6 +149,13 @@ EFFECT = Effect(
             parameters=(_AMPLITUDE, _PERIOD, PHASE, *SECOND_HARMONIC),
             blocks={"report": harmonics},
             pack=_packed,
+        ),
+        Form(
+            name="two_periods",
+            what="two sines whose periods are no multiple of each other",
+            parameters=(_AMPLITUDE, _PERIOD, PHASE, *SECOND_PERIOD),
+            blocks={"report": two_periods},
+            pack=_packed_two_periods,
         ),
         Form(
             name="fading",

@@ -19,6 +19,12 @@ SECOND_HARMONIC = (
     phase("second_phase", "phase of the second harmonic at position 0"),
 )
 
+SECOND_PERIOD = (
+    Parameter("ratio", "1", 0.0, 1.0, 0.3, "second amplitude over the first"),
+    Parameter("order", "1", 1.2, 4.0, 1.5, "waves of the second for each of the first", starts=(1.3, 1.6)),
+    phase("second_phase", "phase of the second at position 0"),
+)
+
 GROWTH = (
     Parameter("growth", "1/mm", -5.0, 5.0, 0.0, "relative growth per mm", starts=(-0.2, 0.2)),
     Parameter("at_depth", "mm", 1e-3, 100.0, 1.0, "depth at which the amplitude holds", fixed=True),

@@ -463,6 +463,16 @@ class TestPeriodic:
         assert_allclose(reported - true, wave, atol=1e-14)
         assert_allclose(cascade.simulate(true + 1, reported), K * np.maximum(true, 0.0), atol=1e-11)
 
+    def test_an_encoder_error_of_two_periods(self) -> None:
+        numbers = {"amplitude": 0.05, "period": 0.8, "phase": 0.5, "ratio": 0.4, "order": 1.7, "second_phase": 1.0}
+        cascade = Cascade(LINEAR, [active("encoder_error", "two_periods", **numbers)])
+        true = np.linspace(-1.0, 2.0, 601)
+        plant = cascade.plant()
+        reported = np.array([plant.reported_mm(float(x)) for x in true])
+        angle = 2 * np.pi * true / 0.8
+        assert_allclose(reported - true, 0.05 * np.sin(angle + 0.5) + 0.02 * np.sin(1.7 * angle + 1.0), atol=1e-14)
+        assert_allclose(cascade.simulate(true + 1, reported), K * np.maximum(true, 0.0), atol=1e-11)
+
     def test_the_encoder_reports_true_plus_error_and_is_undone_before_the_plant(self) -> None:
         for form in ("sine", "harmonics"):
             error = active("encoder_error", form, amplitude=0.05, period=0.8, phase=0.5)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.diagnose import spread
+from bench.diagnose import candidates, spread
 from bench.diagnose.channel import faults, not_of_the_motion
 from bench.diagnose.data import Prepared, prepare
 from bench.diagnose.diagnose import believed_structure
@@ -83,6 +83,25 @@ def test_a_spectrum_gives_back_the_mode_of_the_pad_whose_place_it_has(seed: int)
         np.log(structure.pad.at(f.x[:end]).relaxation.rates) - np.log(believed.rates) for f in (swapped, dealt)
     )
     assert np.max(np.abs(near)) < 0.5 < np.max(np.abs(far))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_period_longer_than_any_that_was_sought_is_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Long periods are not sought while another law may stand first; a shorter one leaves something."""
+    c, p, right = fitted("encoder_error", "harmonic", "harmonics", 2.5, seed, protocol="random_steps")
+    true = c.truth.parameters["encoder_error"]["period"]
+    monkeypatch.setattr(candidates, "LONGEST_REPORTED", 0.7 * true / right.structure.pad.depth_mm)
+    own, values = right.structure.causes[0], right.structure.values(right.x)[0]
+    short = tuple(
+        replace(q, upper=0.7 * true, starts=(), default=0.6 * true, typical=0.6 * true) if q.name == "period" else q
+        for q in own.form.parameters
+    )
+    cause = cause_of(own.effect, replace(own.form, parameters=short), values | {"period": 0.6 * true})
+    structure = right.structure.with_cause_at(0, cause)
+    fit = refit(p.short, structure, structure.x(structure.pad.x()), 40, 1e-8)
+    assert stated(fit, "period")[0] < 0.71 * true
+    again = reshaped(p.short, fit)
+    assert again.chi2 < fit.chi2 and abs(stated(replace(again, spread=None), "period")[0] / true - 1) < 0.1
 
 
 def test_the_best_shape_stays() -> None:
