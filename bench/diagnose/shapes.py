@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim.effects import Form
 
-from .candidates import CHANNEL, Reach, Signatures, combinations, longer, narrowed, starts
+from .candidates import CHANNEL, LONGEST_PERIOD, Reach, Signatures, combinations, longer, narrowed, starts
 from .data import Data
 from .modes import NAMED as MISSING
 from .modes import as_believed, missing_told
@@ -22,7 +22,7 @@ from .ripple import ripples
 Array = NDArray[np.float64]
 
 STEPS, STARTS = 8, 12  # of the fit of another shape
-LONGER = 6  # starts with longer periods, of each shape
+LONGER, ROOM = 6, 1.5  # starts with longer periods, of each shape; times a period, that the longest must be for them
 FEW, TRIED = 3, 2  # steps of the best starts
 NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
@@ -123,6 +123,8 @@ def _longer(short: Data, fit: Fit, index: int) -> Fit:
     if fit.x[k] < structure.upper[k] - EDGE and fit.chi2 < LEFT * max(entries - fit.free, 1.0):
         return fit
     effect, period_mm, travel_mm = cause.effect, values[index]["period"], float(np.ptp(short.position_mm))
+    if ROOM * period_mm > LONGEST_PERIOD * travel_mm:
+        return fit
 
     def carried(form: Form, start: Mapping[str, float], pad: Array, steps: int) -> Fit:
         own = cause_of(effect, longer(form, 0.5 * period_mm, travel_mm), start)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.diagnose import candidates, spread
+from bench.diagnose import candidates, shapes, spread
 from bench.diagnose.channel import faults, not_of_the_motion
 from bench.diagnose.data import Prepared, prepare
 from bench.diagnose.diagnose import believed_structure
@@ -102,6 +102,15 @@ def test_a_period_longer_than_any_that_was_sought_is_found(seed: int, monkeypatc
     assert stated(fit, "period")[0] < 0.71 * true
     again = reshaped(p.short, fit)
     assert again.chi2 < fit.chi2 and abs(stated(replace(again, spread=None), "period")[0] / true - 1) < 0.1
+
+
+def test_a_period_as_long_as_any_that_repeats_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """There is nothing to begin at: a search between bounds that have changed places would never end."""
+    c, p, fit = fitted("encoder_error", "harmonic", "sine", 2.5, protocol="random_steps")
+    period, travel_mm = stated(fit, "period")[0], float(np.ptp(p.short.position_mm))
+    monkeypatch.setattr(shapes, "LONGEST_PERIOD", 1.01 * period / travel_mm)
+    monkeypatch.setattr(shapes, "starts", lambda *_: pytest.fail("begun"))
+    assert shapes._longer(p.short, onto(fit, p.short), 0).structure == fit.structure
 
 
 def test_the_best_shape_stays() -> None:
