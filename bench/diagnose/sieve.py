@@ -360,7 +360,8 @@ def _drawn(trial: Trial) -> bool:
 
 
 def _repeats(trial: Trial) -> bool:
-    return ripples(trial.cause.form) and "report" in trial.cause.form.blocks
+    form = trial.cause.form  # with two periods it can be any curve itself
+    return ripples(form) and "report" in form.blocks and not two_periods(form)
 
 
 def _worth(fit: Fit, ranked: Sequence[Sequence[Trial]], most: int) -> int:
