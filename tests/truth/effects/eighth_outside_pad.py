@@ -1,4 +1,4 @@
-"""Effects of the pad for the judge that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""Effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together. Sources: waves in soft tubes (Moens 1878,
 Korteweg 1878, Lighthill, Waves in Fluids); gels that give way after a delay that goes exponentially with the load
@@ -14,10 +14,10 @@ from numba import njit
 
 from .outside_bench import _child
 from .outside_pad import _added
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 
 
-@judge_effect("echo", "closed_end", "open_end")
+@effect("echo", "closed_end", "open_end")
 def echo(build: Build, shape: str, size: float) -> dict[str, float]:
     """A long soft tube full of water: the wave that a press sends out comes back from its far end, and again.
 
@@ -56,7 +56,7 @@ def _given_way(load, touches, h, delay_s, per_load, takes_s, heals_s):
     return out
 
 
-@judge_effect("delayed_yield", "at_once", "strand_by_strand")
+@effect("delayed_yield", "at_once", "strand_by_strand")
 def delayed_yield(build: Build, shape: str, size: float) -> dict[str, float]:
     """A gel bears its load for a while and then gives way; the more load, the sooner. In air it heals.
 
@@ -77,7 +77,7 @@ def delayed_yield(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"share": share, "delay": delay_s, "per_load": per_load}
 
 
-@judge_effect("pressed_beside", "rhythm", "comes_and_goes")
+@effect("pressed_beside", "rhythm", "comes_and_goes")
 def pressed_beside(build: Build, shape: str, size: float) -> dict[str, float]:
     """Another machine presses the same pad beside this one, and the surface sinks here too as long as it does.
 
@@ -101,7 +101,7 @@ def pressed_beside(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"sinks": sinks, "takes": takes_s}
 
 
-@judge_effect("twitches", "single", "trains")
+@effect("twitches", "single", "trains")
 def twitches(build: Build, shape: str, size: float) -> dict[str, float]:
     """A muscle twitches of itself, pressed or not: q e^{1−q} with q = t/τ, τ of 40 to 90 ms, now more and now less.
 
@@ -144,7 +144,7 @@ def _voids(x, h, quick_mm_s, opens_mm, fades_s, closes_mm):
     return out
 
 
-@judge_effect("voids", "dissolve", "pressed_out")
+@effect("voids", "dissolve", "pressed_out")
 def voids(build: Build, shape: str, size: float) -> dict[str, float]:
     """Let go too fast the pad takes in air, and is softer from then on; let go slowly it is as before.
 

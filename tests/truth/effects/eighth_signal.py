@@ -1,4 +1,4 @@
-"""The judge's shapes: from the cell to the sample.
+"""The eighth shapes: from the cell to the sample.
 
 Sources: bending beams, whose gauges at the root feel each mode in turn the other way (Timoshenko, Young and Weaver,
 Vibration Problems in Engineering), and films squeezed in a gap that the load closes (Blech 1983); air that is trapped
@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from .outside_bench import _child
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import _LAG, _RESONANCE, _disturb, first_order, second_order
 
 _ROOTS = np.array([1.8751040687, 4.6940911330, 7.8547574382])
@@ -49,7 +49,7 @@ def _squeezed(force, h, omega, damping, closes, most):
     return out
 
 
-@judge_shapes("resonance", "bending_beam", "squeeze_film")
+@more_shapes("resonance", "bending_beam", "squeeze_film")
 def resonance(build: Build, shape: str, size: float) -> dict[str, float]:
     """A beam with gauges at its root: 1.14 of the first mode, −0.18 of one at 6.3 f, 0.06 at 17.5 f; or a damping film.
 
@@ -100,7 +100,7 @@ def _opens(force, h, tau, band_N):
     return out
 
 
-@judge_shapes("sensor_lag", "trapped_air", "adaptive")
+@more_shapes("sensor_lag", "trapped_air", "adaptive")
 def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     """Air in a cell of oil, the more compressible the less it bears; or a filter that opens where the force moves.
 
@@ -126,7 +126,7 @@ def characters(force_N: np.ndarray) -> np.ndarray:
     return 1 + np.floor(np.log10(np.maximum(np.floor(1e3 * np.abs(force_N) + 1e-9), 1.0)) + 1e-12)
 
 
-@judge_shapes("force_delay", "backlog", "text_length")
+@more_shapes("force_delay", "backlog", "text_length")
 def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
     """Now and then something else has the processor, and what waits is served late; or longer numbers take longer.
 
@@ -160,7 +160,7 @@ def locked(t: np.ndarray, omega: float, damping: float) -> np.ndarray:
     return t - 2 * damping / omega + rest
 
 
-@judge_shapes("clock_skew", "locks_in", "activity_dip")
+@more_shapes("clock_skew", "locks_in", "activity_dip")
 def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     """A loop takes up the wrong rate of its reference, and overshoots; or a crystal that slows at some temperature.
 
@@ -187,7 +187,7 @@ def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"skew": 1e6 * float(gained(duration)) / duration}
 
 
-@judge_shapes("force_bias", "popcorn")
+@more_shapes("force_bias", "popcorn")
 def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     """The amplifier's zero jumps between two levels, 10 to 20 % apart, at random every 0.5 to 3 s; stated: the mean."""
     rng, duration = build.rng, build.plant.duration_s
@@ -203,7 +203,7 @@ def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"bias": bias}
 
 
-@judge_shapes("force_drift", "gradient", "motor_heat")
+@more_shapes("force_drift", "gradient", "motor_heat")
 def force_drift(build: Build, shape: str, size: float) -> dict[str, float]:
     """Gauges warm before what compensates them: r t e^{−t/τ}, out and back; or a motor warms the cell by what it holds.
 
@@ -236,7 +236,7 @@ def governed(t: np.ndarray, switched_s: np.ndarray, off_Hz: float, back_s: float
     return turns
 
 
-@judge_shapes("mains_hum", "generator")
+@more_shapes("mains_hum", "generator")
 def mains_hum(build: Build, shape: str, size: float) -> dict[str, float]:
     """A generator of its own: a load goes on or off every 2 to 8 s, and the speed falls or rises, and comes back.
 

@@ -1,9 +1,9 @@
-"""The judge's effects of the pad outside the catalogue: each is what its docstring says."""
+"""The eighth effects of the pad outside the catalogue: each is what its docstring says."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_outside_pad import _given_way, _voids
+from .effects.eighth_outside_pad import _given_way, _voids
 from .motion import Path
 from .sets import SETS, shapes_of
 from .test_truth_cases import CATALOGUE
@@ -12,9 +12,9 @@ from .test_truth_effects import hidden
 MINE = ("echo", "delayed_yield", "pressed_beside", "twitches", "voids")
 
 
-def test_they_are_the_judges_alone():
+def test_they_are_of_the_eighth_alone():
     assert not set(MINE) & set(CATALOGUE)
-    assert all(shapes_of(id, *SETS) == shapes_of(id, "judge") and len(shapes_of(id, "judge")) == 2 for id in MINE)
+    assert all(shapes_of(id, *SETS) == shapes_of(id, "eighth") and len(shapes_of(id, "eighth")) == 2 for id in MINE)
 
 
 @pytest.mark.parametrize(("shape", "turned"), [("closed_end", 1), ("open_end", -1)])
@@ -87,7 +87,7 @@ def test_strand_by_strand():
     assert lost[-1] == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("shape", shapes_of("pressed_beside", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("pressed_beside", "eighth"))
 def test_another_press_beside_it(shape):
     motion = Path(1.5).hold(90.0).motion()
     for seed in range(3):
@@ -116,7 +116,7 @@ def test_another_press_beside_it(shape):
 
 def test_twitches():
     motion = Path(1.0).hold(120.0).motion()
-    for shape in shapes_of("twitches", "judge"):
+    for shape in shapes_of("twitches", "eighth"):
         for seed in range(3):
             fine, told, _ = hidden("twitches", shape, motion=motion, seed=seed)
             wave = (fine.force_N[1:] / 3 - 1) / told["growth"]
@@ -151,7 +151,7 @@ def test_voids_open_by_speed():
     assert share[400] == pytest.approx(share[300] * np.exp(-0.05), rel=1e-3)
     assert _voids(x, 1e-3, 9.0, 0.5, np.inf, 1.0)[300] == pytest.approx(-np.expm1(-2.0))
     for seed in range(3):
-        for shape in shapes_of("voids", "judge"):
+        for shape in shapes_of("voids", "eighth"):
             for speed, opens in ((1.5, False), (7.0, True)):
                 path = Path(0.0, np.inf).to(2.0, 50.0).hold(0.1).to(1.0, speed).hold(1.0).to(1.9, 1.0).hold(0.1)
                 motion = path.motion()

@@ -1,10 +1,10 @@
-"""The judge's shapes from the cell to the sample, against closed forms."""
+"""The eighth shapes from the cell to the sample, against closed forms."""
 
 import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_signal import _opens, _squeezed, _with_air, beam_modes, characters, governed, locked
+from .effects.eighth_signal import _opens, _squeezed, _with_air, beam_modes, characters, governed, locked
 from .motion import Path
 from .test_truth_effects import SHORT, disturbed, hidden
 from .test_truth_fourth_signal import QUIET

@@ -1,4 +1,4 @@
-"""Shapes of the pad's own effects for the judge.
+"""Shapes of the pad's own effects.
 
 Sources: rubber bonds that have failed over a part of their area (ASTM D429, Gent and Hamed 1983); threads of polymer
 that thin by elasticity and capillarity (Bazilevskii et al. 1990, Anna and McKinley 2001) and adhesives that lose their
@@ -27,7 +27,7 @@ from ..laws import Law, _Tabulated
 from ..pad import Pad
 from .curves import stretched
 from .plant import simulate
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .structure import hide_law
 from .third_outside_bench import _fades
 
@@ -53,7 +53,7 @@ def _pad_alone(build: Build, t: np.ndarray, **numbers: Any) -> np.ndarray:
     return simulate(replace(plant, numbers=plant.numbers | numbers, sensor=[]), float(t[1] - t[0])).pad_N
 
 
-@judge_shapes("separation", "partly")
+@more_shapes("separation", "partly")
 def separation(build: Build, shape: str, size: float) -> dict[str, float]:
     """The lab believes `bonded`. A twentieth of the surface is still glued and pulls as it would; the rest lets go."""
     build.believed = replace(build.believed, contact="bonded")
@@ -73,7 +73,7 @@ def _gap(build: Build, t: np.ndarray) -> np.ndarray:
     return np.where(force < 0, -np.log(np.clip(-force / 1e-9, 1e-300, 1.0)), 0.0)
 
 
-@judge_shapes("adhesion", "thread", "fouls")
+@more_shapes("adhesion", "thread", "fouls")
 def adhesion(build: Build, shape: str, size: float) -> dict[str, float]:
     """A thread that thins with the time since it was drawn; or a neck that bears less from touch to touch.
 
@@ -126,7 +126,7 @@ class Laminate(_Tabulated):
         return self.modulus * 2 * wanted / (b + np.sqrt(b**2 + 4 * wanted))
 
 
-@judge_shapes("elastic_law", "hyperfoam", "laminate")
+@more_shapes("elastic_law", "hyperfoam", "laminate")
 def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     """The true law is that of the name; the believed one is fitted to it. Sizes but 1 lie between (or beyond) both."""
     rng, depth = build.rng, build.depth_mm
@@ -152,7 +152,7 @@ def _short_of(x, more, way):
     return out
 
 
-@judge_shapes("stress_softening", "by_force", "rejoins_late")
+@more_shapes("stress_softening", "by_force", "rejoins_late")
 def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
     """η = 1 − s (1 − e^{−(F_max − F^e)/f}), f the force of the last `depth` mm; or 1 − s (1 − e^{−(M − δ)/d}).
 
@@ -172,7 +172,7 @@ def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"share": share, "depth": depth}
 
 
-@judge_shapes("damage", "incubates", "either_way")
+@more_shapes("damage", "incubates", "either_way")
 def damage(build: Build, shape: str, size: float) -> dict[str, float]:
     """e^{−r Λ}: Λ = λ − ℓ (1 − e^{−λ/ℓ}), which must first get going; or half of all way in contact, in and out.
 
@@ -192,7 +192,7 @@ def damage(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"rate": rate}
 
 
-@judge_shapes("permanent_set", "log_load", "core_crushes")
+@more_shapes("permanent_set", "log_load", "core_crushes")
 def permanent_set(build: Build, shape: str, size: float) -> dict[str, float]:
     """It goes with ln(1 + F_max/F_0), F_0 of 4 to 10 % of the greatest force; or a brittle core crushes, once.
 
@@ -228,7 +228,7 @@ def havriliak_negami(rate: float, alpha: float, beta: float) -> tuple[np.ndarray
     return weights, rate * unit / y
 
 
-@judge_shapes("missing_relaxation_mode", "havriliak_negami", "two_materials")
+@more_shapes("missing_relaxation_mode", "havriliak_negami", "two_materials")
 def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, float]:
     """A spectrum that is skewed and broad, 1/e of it left at 1/rate; or two modes 10 to 30 apart, about the rate.
 
@@ -252,7 +252,7 @@ def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, 
     return {"share": share, "rate": rate}
 
 
-@judge_shapes("depth_dependent_relaxation", "contact_strain", "lags_behind")
+@more_shapes("depth_dependent_relaxation", "contact_strain", "lags_behind")
 def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[str, float]:
     """ν (1 + s √(δ δ_ref)), by the strain under a sphere, δ_ref the greatest depth; or 1 + s δ, but some time late.
 
@@ -300,7 +300,7 @@ def _damped(build: Build, force: Callable[[np.ndarray, np.ndarray, np.ndarray], 
     build.plant.gain.append(gain)
 
 
-@judge_shapes("viscous_damping", "log_rate", "inner_cell")
+@more_shapes("viscous_damping", "log_rate", "inner_cell")
 def viscous_damping(build: Build, shape: str, size: float) -> dict[str, float]:
     """F^e by the logarithm of speed, C ln(1 + |v|/v_0) more or less; or c v from where a cell of oil inside is met.
 

@@ -1,4 +1,4 @@
-"""The judge's shapes: faults of the force channel.
+"""The eighth shapes: faults of the force channel.
 
 Sources: diodes that clamp an input, whose voltage goes with the logarithm of the current (Shockley 1949; Horowitz and
 Hill, The Art of Electronics); mobile telephones, which send for one of eight slots (GSM 05.02), and converters whose
@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import wrightomega
 
-from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, judge_shapes
+from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, more_shapes
 
 FRAME_S, SLOT_S = 4.615e-3, 0.577e-3
 LEVEL_N = 50.0 / 64
@@ -23,7 +23,7 @@ def clamped(force_N: np.ndarray, limit_N: float, knee_N: float) -> np.ndarray:
     return force_N - knee_N * wrightomega((force_N - limit_N) / knee_N)
 
 
-@judge_shapes("saturation", "diode_clamp")
+@more_shapes("saturation", "diode_clamp")
 def saturation(build: Build, shape: str, size: float) -> dict[str, float]:
     """A diode clamps the input: beyond the limit by the logarithm alone, with a knee of 1 to 2 % of it."""
     share = max(1 - 0.2 * size * float(build.rng.uniform(0.8, 1.2)), 0.3)
@@ -38,7 +38,7 @@ def saturation(build: Build, shape: str, size: float) -> dict[str, float]:
     return told
 
 
-@judge_shapes("outliers", "phone", "sparkle")
+@more_shapes("outliers", "phone", "sparkle")
 def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     """A telephone beside the cell: samples within its slot, 0.577 ms of 4.615, are off; or a code between two levels.
 
@@ -71,7 +71,7 @@ def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     return fraction
 
 
-@judge_shapes("stuck_samples", "flexed_cable", "oven")
+@more_shapes("stuck_samples", "flexed_cable", "oven")
 def stuck_samples(build: Build, shape: str, size: float) -> dict[str, float]:
     """A broken wire parts where the cable is bent, each time the motor goes through a place; or an oven is on.
 

@@ -1,10 +1,10 @@
-"""The judge's shapes of the channel's faults, against closed forms and counts."""
+"""The eighth shapes of the channel's faults, against closed forms and counts."""
 
 import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_channel import LEVEL_N, clamped
+from .effects.eighth_channel import LEVEL_N, clamped
 from .effects.registry import SATURATION, Samples
 from .test_truth_effects import hidden
 from .test_truth_fourth_signal import MANY

@@ -1,9 +1,9 @@
-"""The judge's effects of the bench outside the catalogue: each is what its docstring says."""
+"""The eighth effects of the bench outside the catalogue: each is what its docstring says."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_outside_bench import _slews, _tips
+from .effects.eighth_outside_bench import _slews, _tips
 from .effects.registry import Samples
 from .motion import Path
 from .sets import SETS, shapes_of
@@ -15,12 +15,12 @@ from .test_truth_third_outside import added
 MINE = ("neighbour", "interleaving", "slew_limit", "stuck_bit", "battery", "short_leg")
 
 
-def test_they_are_of_the_judge_alone():
+def test_they_are_of_the_eighth_alone():
     assert not set(MINE) & set(CATALOGUE)
-    assert all(len(shapes_of(id, "judge")) == 2 and shapes_of(id, *SETS) == shapes_of(id, "judge") for id in MINE)
+    assert all(len(shapes_of(id, "eighth")) == 2 and shapes_of(id, *SETS) == shapes_of(id, "eighth") for id in MINE)
 
 
-@pytest.mark.parametrize("shape", shapes_of("neighbour", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("neighbour", "eighth"))
 def test_a_station_beside(shape):
     t = np.arange(0, 300, 1e-3)
     reads = []
@@ -56,7 +56,7 @@ def test_a_station_beside(shape):
         assert np.mean(read) == pytest.approx(0.63, abs=0.12)
 
 
-@pytest.mark.parametrize("shape", shapes_of("interleaving", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("interleaving", "eighth"))
 def test_converters_that_take_turns(shape):
     counts = set()
     for seed in range(12):
@@ -106,7 +106,7 @@ def test_an_output_that_cannot_go_quicker():
         assert np.max(np.abs(fine.force_N - fine.cell_N)[slow]) < 12.0 * 0.01 * told["full"] * 1.05
 
 
-@pytest.mark.parametrize("shape", shapes_of("stuck_bit", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("stuck_bit", "eighth"))
 def test_a_bit_that_is_never_set(shape):
     _, told, build = hidden("stuck_bit", shape, motion=Path(1.0).hold(200.0).motion())
     ((_, stage),) = build.plant.sensor
@@ -127,7 +127,7 @@ def test_a_bit_that_is_never_set(shape):
     assert 0.7 < np.mean(dwells) < 5.5 and np.std(dwells) == pytest.approx(np.mean(dwells), rel=0.4)
 
 
-@pytest.mark.parametrize("shape", shapes_of("battery", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("battery", "eighth"))
 def test_a_battery_that_gives_way(shape):
     fine, told, _ = hidden("battery", shape, motion=Path(1.0).hold(120.0).motion())
     t, more = fine.time_s[1:], (fine.force_N[1:] / 3 - 1) / told["more"]
@@ -154,7 +154,7 @@ def test_a_table_with_a_short_leg():
     load = np.array([0.0, 0.5, 0.2, 0.1, 0.35, 0.45, 0.1, 0.9, 0.3])
     # Tips at 0.4 and then at 0.6; back at half of each.
     assert np.array_equal(_tips(load, np.array([0.4, 0.6]), 0.5), [0, 1, 1, 0, 0, 0, 0, 2, 2])
-    for shape in shapes_of("short_leg", "judge"):
+    for shape in shapes_of("short_leg", "eighth"):
         motion = touches(40, hold_s=0.3, speed=4.0)
         fine, told, _ = hidden("short_leg", shape, motion=motion)
         period, deeper, levels = motion.duration_s / 40, [], []

@@ -1,4 +1,4 @@
-"""The judge's shapes of what lies between the motor and the pad against closed forms."""
+"""The eighth shapes of what lies between the motor and the pad against closed forms."""
 
 from math import erf
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_machine import Curled, _power_creep, _rate_and_state, _slip_weakens
+from .effects.eighth_machine import Curled, _power_creep, _rate_and_state, _slip_weakens
 from .laws import Power
 from .motion import Path
 from .sets import shapes_of
@@ -16,10 +16,10 @@ OTHERS = ("friction", "adhesion", "viscous_damping", "stress_softening", "damage
 FRAMES = ("printed", "clamp_loosens")
 
 
-def test_they_are_of_the_judge():
-    assert set(FRAMES) <= set(shapes_of("frame_compliance", "judge"))
+def test_they_are_of_the_eighth():
+    assert set(FRAMES) <= set(shapes_of("frame_compliance", "eighth"))
     for id in ("backlash", "friction", "inertia", "cogging", "encoder_error"):
-        assert len(shapes_of(id, "judge")) >= 2
+        assert len(shapes_of(id, "eighth")) >= 2
 
 
 def power_of_time(t, force, power, at):

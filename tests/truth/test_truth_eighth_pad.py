@@ -1,11 +1,11 @@
-"""The judge's shapes of the pad's own effects against closed forms."""
+"""The eighth shapes of the pad's own effects against closed forms."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from .effects.judge_pad import HyperFoam, Laminate, _short_of, _unrelaxed, havriliak_negami
+from .effects.eighth_pad import HyperFoam, Laminate, _short_of, _unrelaxed, havriliak_negami
 from .effects.plant import simulate as plant_steps
 from .laws import Power
 from .motion import Path
@@ -202,7 +202,7 @@ def test_the_spectrum_of_havriliak_and_negami():
         assert np.max(np.abs(made - told)) < 0.02
 
 
-@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "eighth"))
 def test_what_is_added_has_its_share(shape):
     pad = Pad(Power(3.0, 0.0), (0.3,), (50.0,))
     for seed in range(2):
@@ -262,7 +262,7 @@ def test_what_relaxes_is_made_up_for():
     assert np.allclose(force[100:], wanted[100:], atol=2e-3) and np.all(added[:100] == 0)
 
 
-@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("viscous_damping", "eighth"))
 @pytest.mark.parametrize("pad", [Pad(Power(3.0, 0.0)), Pad(Power(3.0, 0.0), (0.3, 0.2), (8.0, 0.5), "bonded")])
 def test_damping(shape, pad):
     speeds, parts = np.array([2.0, 5.0, 20.0, 80.0]), []

@@ -1,4 +1,4 @@
-"""Effects of the bench that the catalogue has no name for, of the judge half. A size of 1 is some 1–3 % of the force.
+"""Effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together. Sources: multiplexers that pass on a part of
 the channel beside (Kester, Data Conversion Handbook); converters and amplifiers that take turns (Black and Hodges
@@ -15,12 +15,12 @@ import numpy as np
 from numba import njit
 
 from .outside_bench import _AMPLIFIER, _child
-from .registry import DISTURBANCE, Build, Samples, judge_effect, spread
+from .registry import DISTURBANCE, Build, Samples, effect, spread
 from .sensor import _disturb
 from .third_outside_bench import _fades
 
 
-@judge_effect("neighbour", "presses", "steps")
+@effect("neighbour", "presses", "steps")
 def neighbour(build: Build, shape: str, size: float) -> dict[str, float]:
     """A multiplexer reads a part of the channel beside with ours: a station that presses its own sample, at its times.
 
@@ -43,7 +43,7 @@ def neighbour(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"part": part}
 
 
-@judge_effect("interleaving", "each_sample", "ping_pong")
+@effect("interleaving", "each_sample", "ping_pong")
 def interleaving(build: Build, shape: str, size: float) -> dict[str, float]:
     """Converters that take turns have not quite the same gain; all have the same zero.
 
@@ -81,7 +81,7 @@ def _slews(force, h, up_N_s, down_N_s, tau):
     return out
 
 
-@judge_effect("slew_limit", "both_ways", "slow_back")
+@effect("slew_limit", "both_ways", "slow_back")
 def slew_limit(build: Build, shape: str, size: float) -> dict[str, float]:
     """An amplifier whose output can go only so quickly: quick presses come late and too low, slow ones as they are.
 
@@ -100,7 +100,7 @@ def slew_limit(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"full": full_s}
 
 
-@judge_effect("stuck_bit", "always", "at_times")
+@effect("stuck_bit", "always", "at_times")
 def stuck_bit(build: Build, shape: str, size: float) -> dict[str, float]:
     """A bit of the converter is never set: its weight is missing from each other span of the force, as wide as it is.
 
@@ -122,7 +122,7 @@ def stuck_bit(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"weight": weight, "begins": begins * weight}
 
 
-@judge_effect("battery", "telegrams", "on_air")
+@effect("battery", "telegrams", "on_air")
 def battery(build: Build, shape: str, size: float) -> dict[str, float]:
     """A cell with a radio: as it sends, its battery gives way and the reference with it, and the force reads too high.
 
@@ -158,7 +158,7 @@ def _tips(load, levels, back):
     return out
 
 
-@judge_effect("short_leg", "tips", "shuffles")
+@effect("short_leg", "tips", "shuffles")
 def short_leg(build: Build, shape: str, size: float) -> dict[str, float]:
     """A table with a short leg tips under the load, so that the pad goes away by a step, and back as it is relieved.
 

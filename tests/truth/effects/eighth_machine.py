@@ -1,4 +1,4 @@
-"""Shapes of what lies between the motor and the pad, of the judge half.
+"""Shapes of what lies between the motor and the pad.
 
 Sources: frames with printed parts, which creep by a power of time (Findley, Lai and Onaran 1976), and clamps that the
 changes of load work loose (Bickford, bolted joints; Junker 1969); nuts that a spring holds without play (Slocum,
@@ -25,7 +25,7 @@ from numba import njit
 from ..laws import Law, _Tabulated
 from .outside_bench import _child
 from .plant import simulate
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import first_order
 from .third_machine import _sliding, _worn
 
@@ -74,7 +74,7 @@ def _yields(build: Build, compliance: float, given: Callable[[np.ndarray, np.nda
     build.plant.play.append(stage)
 
 
-@judge_shapes("frame_compliance", "printed", "clamp_loosens")
+@more_shapes("frame_compliance", "printed", "clamp_loosens")
 def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     """Printed parts creep by a power of time, with no last value; or a clamp that each change of the load loosens.
 
@@ -94,7 +94,7 @@ def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"compliance": compliance}
 
 
-@judge_shapes("backlash", "sprung_nut", "teeth")
+@more_shapes("backlash", "sprung_nut", "teeth")
 def backlash(build: Build, shape: str, size: float) -> dict[str, float]:
     """A spring holds the halves of a nut apart until the load is more than it; or each tooth has a width of its own.
 
@@ -146,7 +146,7 @@ class Curled(_Tabulated):
         return self.law.model(depth_mm)
 
 
-@judge_shapes("contact_offset", "curled")
+@more_shapes("contact_offset", "curled")
 def contact_offset(build: Build, shape: str, size: float) -> dict[str, float]:
     """The surface lies elsewhere, and the sample is curled: up to 30 µm of air below it, gone at 1 % of the load or so.
 
@@ -191,7 +191,7 @@ def _rate_and_state(x, h, direct, heals, length):
     return out
 
 
-@judge_shapes("friction", "slip_weakens", "rate_and_state", "cold_grease")
+@more_shapes("friction", "slip_weakens", "rate_and_state", "cold_grease")
 def friction(build: Build, shape: str, size: float) -> dict[str, float]:
     """More over the first way after each rest or turn; by the logarithms of speed and age; or a grease that warms.
 
@@ -219,7 +219,7 @@ def friction(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"coulomb": coulomb}
 
 
-@judge_shapes("inertia", "bath", "compensated")
+@more_shapes("inertia", "bath", "compensated")
 def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     """Liquid of a bath that the probe takes along, and more of it the longer; or what a correction has left over.
 
@@ -243,7 +243,7 @@ def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"mass": mass}
 
 
-@judge_shapes("cogging", "eddy_currents", "current_sensors")
+@more_shapes("cogging", "eddy_currents", "current_sensors")
 def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     """Solid iron, whose field comes late and is less at speed; or current sensors with an offset and unequal gains.
 
@@ -268,7 +268,7 @@ def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "period": period}
 
 
-@judge_shapes("encoder_error", "slow_loop", "sets_itself")
+@more_shapes("encoder_error", "slow_loop", "sets_itself")
 def encoder_error(build: Build, shape: str, size: float) -> dict[str, float]:
     """The loop follows the wrong scale as far as it is quick enough; or the interpolator sets its offsets on the way.
 
