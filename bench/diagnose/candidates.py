@@ -72,13 +72,12 @@ def narrowed(form: Form, reach: Reach) -> Form:
     return replace(form, parameters=tuple(_narrowed(p, reach, longest_mm) for p in form.parameters))
 
 
-def longer(form: Form, than_mm: float, travel_mm: float) -> Form:
-    """The form with periods longer than one, up to the longest that repeats over the travel."""
-    to_mm = LONGEST_PERIOD * travel_mm
+def with_periods(form: Form, from_mm: float, to_mm: float) -> Form:
+    """The form with periods of this range."""
     return replace(
         form,
         parameters=tuple(
-            _within(p, than_mm, to_mm, p.starts, p.if_left_out) if p.name == "period" else p for p in form.parameters
+            _within(p, from_mm, to_mm, p.starts, p.if_left_out) if p.name == "period" else p for p in form.parameters
         ),
     )
 

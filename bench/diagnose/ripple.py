@@ -55,7 +55,8 @@ def starts(
     lowest, highest = 1.0 / period.upper, 1.0 / period.lower
     step = lowest / math.ceil(lowest * PERIODS / max(highest - lowest, 1e-9 * highest))
     waves = range(round(lowest / step), int(highest / step) + 1)
-    every = sorted({wave for pair in _combined(form, waves) for wave in pair if wave})
+    combined = _combined(form, waves)
+    every = sorted({wave for pair in combined for wave in pair if wave})
     pairs = {k: [column(1.0 / (k * step), phase) for phase in (0.0, 0.5 * math.pi)] for k in every}
     at = {k: slice(2 * i, 2 * i + 2) for i, k in enumerate(pairs)}
     columns = np.stack([column for pair in pairs.values() for column in pair], axis=1)
@@ -64,7 +65,7 @@ def starts(
     columns = np.where(usable, columns, 0.0)
     gram, along = columns.T @ columns, np.sum(columns * residual[:, None], axis=0)
     found = []
-    for k, other in _combined(form, waves):
+    for k, other in combined:
         of = np.r_[at[k], at[other]] if other else np.r_[at[k]]
         if usable[of].all():
             sizes = np.linalg.lstsq(gram[np.ix_(of, of)], along[of], rcond=1e-10)[0]
@@ -80,16 +81,14 @@ def starts(
             yield {"period": near, **_waves(sizes, form), **order}, promise
 
 
-def _combined(form: Form, waves: range) -> Iterator[tuple[int, int]]:
+def _combined(form: Form, waves: range) -> list[tuple[int, int]]:
     """Waves over the longest way for each that a form may have, with those of its second sine; 0: it has none."""
     named = {p.name: p for p in form.parameters}
-    for k in waves:
-        if two_periods(form):
-            order = named["order"]
-            shorter = range(waves.start, 2 * waves.stop)
-            yield from ((k, other) for other in shorter if order.lower < other / k < order.upper)
-        else:
-            yield k, 2 * k if "ratio" in named else 0
+    if two_periods(form):
+        order = named["order"]
+        shorter = range(waves.start, 2 * waves.stop)
+        return [(k, other) for k in waves for other in shorter if order.lower < other / k < order.upper]
+    return [(k, 2 * k if "ratio" in named else 0) for k in waves]
 
 
 def _waves(sizes: Array, form: Form) -> dict[str, float]:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from sim.effects import Form
 
-from .candidates import CHANNEL, LONGEST_PERIOD, Reach, Signatures, combinations, longer, narrowed, starts
+from .candidates import CHANNEL, LONGEST_PERIOD, Reach, Signatures, combinations, narrowed, starts, with_periods
 from .data import Data
 from .modes import NAMED as MISSING
 from .modes import as_believed, missing_told
-from .numbers import Structure, cause_of
+from .numbers import Cause, Structure, cause_of
 from .refit import Fit, force_at, reduced, refit
 from .ripple import ripples
 
@@ -122,24 +122,28 @@ def _longer(short: Data, fit: Fit, index: int) -> Fit:
     k = structure.of_cause(index).start + [p.name for p in cause.fitted].index("period")
     if fit.x[k] < structure.upper[k] - EDGE and fit.chi2 < LEFT * max(entries - fit.free, 1.0):
         return fit
-    effect, period_mm, travel_mm = cause.effect, values[index]["period"], float(np.ptp(short.position_mm))
-    if ROOM * period_mm > LONGEST_PERIOD * travel_mm:
+    period_mm, longest_mm = values[index]["period"], LONGEST_PERIOD * float(np.ptp(short.position_mm))
+    if ROOM * period_mm > longest_mm:
         return fit
 
     def carried(form: Form, start: Mapping[str, float], pad: Array, steps: int) -> Fit:
-        own = cause_of(effect, longer(form, 0.5 * period_mm, travel_mm), start)
-        joined = structure.with_cause_at(index, own)
-        x = joined.x(pad, [*values[:index], own.start, *values[index + 1 :]], fit.of_run)
-        return refit(short, joined, x, steps, NEARLY)
+        own = cause_of(cause.effect, with_periods(form, 0.5 * period_mm, longest_mm), start)
+        return refit(short, *_in_place(fit, index, own, pad), steps, NEARLY)
 
     bare = refit(short, *reduced(fit, index), END, 1e-8)
     signatures, end = Signatures(short, bare), len(structure.pad.coordinates)
     found = [fit, carried(cause.form, values[index], fit.x[:end], END)]
-    for form in [f for f in effect.forms if f.sought]:
-        begun = starts(signatures, effect, longer(form, 1.02 * period_mm, travel_mm), LONGER)
+    for form in [f for f in cause.effect.forms if f.sought]:
+        begun = starts(signatures, cause.effect, with_periods(form, 1.02 * period_mm, longest_mm), LONGER)
         tried = sorted((carried(form, s.cause.start, bare.x[:end], STEPS) for s in begun), key=lambda f: f.chi2)
         found += [refit(short, f.structure, f.x, END, 1e-8) for f in tried[: LONGER // 2]]
     return found[int(np.argmin(scores(short, [Member(f, index) for f in found])))]
+
+
+def _in_place(fit: Fit, index: int, cause: Cause, pad: Array) -> tuple[Structure, Array]:
+    """The structure with another cause in a place, and x where that and the pad begin anew, all else as it is."""
+    structure, values = fit.structure.with_cause_at(index, cause), fit.structure.values(fit.x)
+    return structure, structure.x(pad, [*values[:index], cause.start, *values[index + 1 :]], fit.of_run)
 
 
 def departed(fit: Fit, index: int) -> bool:
@@ -167,9 +171,7 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     pad = lead.x[: len(structure.pad.coordinates)]
     begun: list[tuple[float, Structure, Array]] = []
     for started in [{}, *others]:
-        own = cause_of(cause.effect, shape, told | started)
-        joined = structure.with_cause_at(index, own)
-        x = joined.x(pad, [*values[:index], own.start, *values[index + 1 :]], lead.of_run)
+        joined, x = _in_place(lead, index, cause_of(cause.effect, shape, told | started), pad)
         force = force_at(short, joined, x)
         if not np.isfinite(force).all():
             continue

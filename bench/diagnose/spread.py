@@ -3,7 +3,7 @@ family leaves something that no shape of it explains, and where several shapes s
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,7 @@ Array = NDArray[np.float64]
 
 UNKNOWN = 1.0  # variance of a logarithm with which nothing in the data moves
 INEXACT = 0.02  # of what a cause takes, that its true shape may be from the nearest of its family
-FAR = (
-    0.25  # of a number, that a shape which fits worse counts as being away at the most: further, it means another thing
-)
+FAR = 0.25  # of a number, that a shape which fits worse counts as away at the most: further, it means another thing
 STEPS_WITHOUT, NEARLY = 8, 1e-5  # of the fit without a cause, and of χ², that a step of it must promise
 STEPS = np.geomspace(1e-4, 1.0, 25)  # of a number about which χ² is flat
 WIDEST = 1e6  # times the variance that the stand-in tells
@@ -108,25 +106,29 @@ def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
             told = members[0].variances[p.name]  # 0: the stand-in says nothing of it
             wider = min(max(float(own[position]) / told, 1.0), WIDEST) if told > 0.0 else 1.0
             away = [_away(m, p.name, every[place][p.name], c, wider, float(own[position])) for m in members[1:]]
-            as_told = sum(w * (step**2 + more) for w, (step, more, _) in zip(plain[1:], away, strict=True))
-            inexact = sum(
-                w * (min(step, far) ** 2 + more) for w, (step, more, far) in zip(rough[1:], away, strict=True)
-            )
+            as_told = sum(w * (a.step**2 + a.more) for w, a in zip(plain[1:], away, strict=True))
+            inexact = sum(w * (min(a.step, a.far) ** 2 + a.more) for w, a in zip(rough[1:], away, strict=True))
             out[position] = max(as_told, inexact)
     return out
 
 
-def _away(
-    member: Member, name: str, here: float, c: Coordinate, wider: float, own: float
-) -> tuple[float, float, float]:
-    """How far off a number is in another shape, by how much its variance there is more, and how far it counts as being
-    off at the most where that shape fits worse, all in the coordinate."""
+@dataclass(frozen=True)
+class _Away:
+    """A number in another shape, in the coordinate: how far off it is, by how much its variance there is more, and how
+    far it counts as being off at the most where that shape fits worse."""
+
+    step: float
+    more: float
+    far: float
+
+
+def _away(member: Member, name: str, here: float, c: Coordinate, wider: float, own: float) -> _Away:
     far = FAR if c.logarithmic else FAR * abs(here) / c.unit
     if name not in member.variances:  # a choice of that form, which knows no such number
-        return float(np.sqrt(UNKNOWN)), 0.0, far
+        return _Away(float(np.sqrt(UNKNOWN)), 0.0, far)
     there = member.values[name]
     step = np.log(max(there, 1e-300) / here) if c.logarithmic else (there - here) / c.unit
-    return abs(float(step)), min(max(wider * member.variances[name] - own, 0.0), own), far
+    return _Away(abs(float(step)), min(max(wider * member.variances[name] - own, 0.0), own), far)
 
 
 def _weights(score: Array) -> tuple[Array, Array]:

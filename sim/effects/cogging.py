@@ -38,13 +38,6 @@ def sine(dt: float, y: float, state: State, p: State) -> float:
 
 
 @block
-def harmonics(dt: float, y: float, state: State, p: State) -> float:
-    """Force in N; p = (amplitude, period, phase, ratio, second_phase)."""
-    angle = 2.0 * math.pi * y / p[1]
-    return p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(2.0 * angle + p[4]))
-
-
-@block
 def swelling(dt: float, y: float, state: State, p: State) -> float:
     """Force in N; p = (amplitude, period, phase, growth, at_depth)."""
     return p[0] * (1.0 + p[3] * (y - p[4])) * math.sin(2.0 * math.pi * y / p[1] + p[2])
@@ -99,6 +92,11 @@ def creeping(dt: float, y: float, state: State, p: State) -> float:
     return p[0] * math.sin(2.0 * math.pi * y / p[1] + p[2] + p[3] * state[2])
 
 
+def _second_harmonic(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `two_periods` reads where the second sine is the second harmonic."""
+    return (values["amplitude"], values["period"], values["phase"], values["ratio"], 2.0, values["second_phase"])
+
+
 def _of_the_first_harmonic(values: Mapping[str, float]) -> tuple[float, ...]:
     """What `slotted` reads: a mean over half a period of equal steps, which is exact for smooth waves."""
     sines = [math.sin(math.pi * (k + 0.5) / _STEPS) for k in range(_STEPS)]
@@ -147,7 +145,8 @@ EFFECT = Effect(
             name="harmonics",
             what="a sine and its second harmonic",
             parameters=(_AMPLITUDE, _PERIOD, PHASE, *SECOND_HARMONIC),
-            blocks={"probe": harmonics},
+            blocks={"probe": two_periods},
+            pack=_second_harmonic,
         ),
         Form(
             name="swelling",

@@ -37,13 +37,6 @@ def sine(dt: float, x: float, state: State, p: State) -> float:
 
 
 @block
-def harmonics(dt: float, x: float, state: State, p: State) -> float:
-    """Reported position; p = (amplitude, wave number, phase, ratio, second phase)."""
-    angle = p[1] * x
-    return x + p[0] * (math.sin(angle + p[2]) + p[3] * math.sin(2.0 * angle + p[4]))
-
-
-@block
 def two_periods(dt: float, x: float, state: State, p: State) -> float:
     """Reported position; p = (amplitude, wave number, phase, ratio, order, second phase)."""
     angle = p[1] * x
@@ -94,17 +87,11 @@ def _packed_fading(values: Mapping[str, float]) -> tuple[float, ...]:
     return (amplitude, wave_number, values["phase"], growth, values["at_depth"])
 
 
-def _packed_two_periods(values: Mapping[str, float]) -> tuple[float, ...]:
-    wave_number, ratio, order = 2.0 * math.pi / values["period"], values["ratio"], values["order"]
-    amplitude = min(values["amplitude"], _STEEPEST / (wave_number * (1.0 + order * ratio)))
-    return (amplitude, wave_number, values["phase"], ratio, order, values["second_phase"])
-
-
 def _packed(values: Mapping[str, float]) -> tuple[float, ...]:
-    wave_number = 2.0 * math.pi / values["period"]
-    ratio = values.get("ratio", 0.0)
-    amplitude = min(values["amplitude"], _STEEPEST / (wave_number * (1.0 + 2.0 * abs(ratio))))
-    return (amplitude, wave_number, values["phase"], ratio, values.get("second_phase", 0.0))
+    """What `sine` and `two_periods` read; a second harmonic is the second period of order 2."""
+    wave_number, ratio, order = 2.0 * math.pi / values["period"], values.get("ratio", 0.0), values.get("order", 2.0)
+    amplitude = min(values["amplitude"], _STEEPEST / (wave_number * (1.0 + order * abs(ratio))))
+    return (amplitude, wave_number, values["phase"], ratio, order, values.get("second_phase", 0.0))
 
 
 _AMPLITUDE = Parameter(
@@ -147,7 +134,7 @@ EFFECT = Effect(
             name="harmonics",
             what="a sine and its second harmonic",
             parameters=(_AMPLITUDE, _PERIOD, PHASE, *SECOND_HARMONIC),
-            blocks={"report": harmonics},
+            blocks={"report": two_periods},
             pack=_packed,
         ),
         Form(
@@ -155,7 +142,7 @@ EFFECT = Effect(
             what="two sines whose periods are no multiple of each other",
             parameters=(_AMPLITUDE, _PERIOD, PHASE, *SECOND_PERIOD),
             blocks={"report": two_periods},
-            pack=_packed_two_periods,
+            pack=_packed,
         ),
         Form(
             name="fading",
