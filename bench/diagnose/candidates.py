@@ -36,6 +36,7 @@ BENDS_AT = (0.08, 0.14, 0.2, 0.28, 0.38, 0.5, 0.7)  # of the depth reached
 MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
 FRESH = 0.9  # of the depth reached, beyond which a softening pad must go for the first time in the run
 EVERY = tuple(0.1 * 1.1**k for k in range(24))  # of the run
+COARSE = 500  # samples in which what the load changes is counted: in finer ones noise would count
 LONGEST_REPORTED = 0.7  # of the depth, for errors of the position: longer ones are another elastic law
 
 
@@ -58,9 +59,25 @@ class Reach:
     travel_mm: float
     depth_mm: float
     force_N: float
+    changes_N: float
+    """All that the load changes, up and down, as a linear pad's would."""
     rich: bool = True
     """Whether depths are held, or passed again: what depends on the position alone differs there from a law, which
     relaxes. In one pass over the depth it is told only by many periods."""
+
+    @classmethod
+    def of(cls, data: Data, sample_s: float, depth_mm: float, force_N: float, rich: bool = True) -> Reach:
+        """That of some data, of which the pad is pressed so deep and bears so much at the most."""
+        into_mm = np.maximum(data.position_mm[:: max(1, data.size // COARSE)], 0.0)
+        return cls(
+            sample_s=sample_s,
+            span_s=float(data.time_s[-1] - data.time_s[0]),
+            travel_mm=float(np.ptp(data.position_mm)),
+            depth_mm=depth_mm,
+            force_N=force_N,
+            changes_N=max(float(np.sum(np.abs(np.diff(into_mm)))) * force_N / depth_mm, force_N),
+            rich=rich,
+        )
 
 
 def narrowed(form: Form, reach: Reach) -> Form:
@@ -119,6 +136,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         default = 0.5 * reach.depth_mm
     elif p.name == "at_swing":
         default = 0.03 * reach.force_N
+    elif p.name == "at_change":
+        default = 0.5 * reach.changes_N
     elif p.name == "at_force":
         default = 0.6 * reach.force_N
     elif p.name == "limit" and p.unit == "N":

@@ -163,15 +163,14 @@ def _comparable(one: Form, other: Form) -> bool:
 def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     """Another shape in place of a cause of a fit, carried to its minimum; None where it makes no plant."""
     structure, values = lead.structure, lead.structure.values(lead.x)
-    cause = structure.causes[index]
-    shape = narrowed(form, _reach(short, structure))
+    cause, pad, end = structure.causes[index], structure.pad, len(structure.pad.coordinates)
+    shape = narrowed(form, Reach.of(short, short.sample_s, pad.depth_mm, pad.force_N))
     told = {p.name: values[index][p.name] for p in shape.parameters if p.name in values[index]}
     fresh = replace(shape, parameters=tuple(p for p in shape.parameters if p.name not in told))
     others = [*_thinned(list(combinations(fresh))), *_thinned(list(combinations(shape)))]
-    pad = lead.x[: len(structure.pad.coordinates)]
     begun: list[tuple[float, Structure, Array]] = []
     for started in [{}, *others]:
-        joined, x = _in_place(lead, index, cause_of(cause.effect, shape, told | started), pad)
+        joined, x = _in_place(lead, index, cause_of(cause.effect, shape, told | started), lead.x[:end])
         force = force_at(short, joined, x)
         if not np.isfinite(force).all():
             continue
@@ -188,13 +187,3 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
 
 def _thinned(every: list[dict[str, float]]) -> list[dict[str, float]]:
     return every[:: max(1, len(every) // STARTS)]
-
-
-def _reach(short: Data, structure: Structure) -> Reach:
-    return Reach(
-        sample_s=short.sample_s,
-        span_s=float(short.time_s[-1] - short.time_s[0]),
-        travel_mm=float(np.ptp(short.position_mm)),
-        depth_mm=structure.pad.depth_mm,
-        force_N=structure.pad.force_N,
-    )

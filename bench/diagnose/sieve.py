@@ -54,14 +54,8 @@ class Sieve:
         self.believed = structure
         self.samples = float(prepared.full.weight.sum())
         full = prepared.full
-        self.reach = Reach(
-            sample_s=prepared.sample_s,
-            span_s=float(full.time_s[-1] - full.time_s[0]),
-            travel_mm=float(np.ptp(full.position_mm)),
-            depth_mm=prepared.depth_mm,
-            force_N=prepared.force_scale_N,
-            rich=structure.in_air or is_rich(full),
-        )
+        rich = structure.in_air or is_rich(full)
+        self.reach = Reach.of(full, prepared.sample_s, prepared.depth_mm, prepared.force_scale_N, rich)
 
     @property
     def short(self) -> Data:

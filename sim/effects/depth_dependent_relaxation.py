@@ -14,8 +14,10 @@
 - `beyond`: 1 up to a share `begins` of the reach, and linear from there; `slope` is the mean from the surface to the
   reach: cells or asperities that must close first (L. J. Gibson, M. F. Ashby, Cellular Solids, 2nd ed., Cambridge
   University Press, 1997).
+- `late`: 1 + slope · d, where d follows the depth with a time constant: the structure takes its time (A. J. Kovacs,
+  Transition vitreuse dans les polymères amorphes, Fortschr. Hochpolym.-Forsch. 3, 1963, 394–507).
 
-`linear`, `exponential`, `free_volume` and `knee` have the relative slope `slope` at the surface.
+`linear`, `exponential`, `free_volume`, `knee` and `late` have the relative slope `slope` at the surface.
 
 Reference: R. A. Schapery, On the characterization of nonlinear viscoelastic materials, Polym. Eng. Sci. 9, 1969,
 295–310 (shift factor that depends on strain).
@@ -26,6 +28,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.linear import first_order as lagged
 from sim.jit import State, block, compiled
 
 _LEAST = 0.1
@@ -95,6 +98,15 @@ def beyond(dt: float, depth: float, state: State, p: State) -> float:
     return _kept(factor)
 
 
+@block
+def late(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on the rates; p = (slope, time_constant); state: the depth that is followed, and the depth before."""
+    here = max(depth, 0.0)
+    state[0] = lagged(dt, state[0], state[1], here, p[1])
+    state[1] = here
+    return _kept(1.0 + p[0] * state[0])
+
+
 _SLOPE = Parameter(
     "slope",
     "1/mm",
@@ -160,6 +172,17 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"rate": beyond},
+        ),
+        Form(
+            name="late",
+            what="rates linear in a depth that is followed late",
+            parameters=(
+                _SLOPE,
+                Parameter("time_constant", "s", 1e-2, 1e3, 0.5, "how late it is followed", starts=(0.2, 1.0)),
+            ),
+            sought=False,
+            blocks={"rate": late},
+            state=(0.0, 0.0),
         ),
     ),
 )

@@ -24,6 +24,10 @@ of K. The force used is the one at the cell, solved within the step (sim/kernel.
 - `jamming`: C F (1 − μ) as the load grows and C F (1 + μ) as it goes, stuck between the two: a taper or a clamp whose
   faces rub under the load that they bear (J. E. Shigley, C. R. Mischke, Mechanical Engineering Design, McGraw-Hill,
   on wedges that lock themselves).
+- `loosening`: C (1 + g (W/W_0 − 1)) F, where W = ∫ |dF| is all that the load has changed since the first sample: a
+  clamp that each change loosens, or beds in. What is within a hundredth of `at_force` loosens nothing: faces must slip
+  (G. H. Junker, New criteria for self-loosening of fasteners under vibration, SAE Technical Paper 690055, 1969). C is
+  that at `at_change` W_0.
 - `damped`: d + τ d' = C F, all of it late: a mount of rubber or a damped column, a spring with a dashpot beside it
   (E. I. Rivin, Passive Vibration Isolation, ASME Press, 2003, on Kelvin and Voigt's model of rubber). Exact, too.
 
@@ -94,6 +98,16 @@ def creeping(dt: float, force: float, state: State, p: State) -> float:
     state[0] = force - (force - state[1]) * mean + (state[0] - state[1]) * keep
     state[1] = force
     return p[0] * ((1.0 - p[1]) * force + p[1] * state[0]) / (1.0 - 0.5 * p[1])
+
+
+@block
+def loosening(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection in mm; p = (compliance, growth, at_change, at_force); state: force followed, all it has changed."""
+    slips = 0.01 * p[3]
+    followed = min(max(state[0], force - slips), force + slips)
+    state[1] += abs(followed - state[0])
+    state[0] = followed
+    return p[0] * max(1.0 + p[1] * (state[1] / p[2] - 1.0), 0.0) * force
 
 
 def _all_late(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -205,6 +219,19 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"frame": creeping},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="loosening",
+            what="ever softer with each change of the load, or stiffer",
+            parameters=(
+                _compliance("deflection per newton at `at_change`"),
+                Parameter("growth", "1", -0.9, 0.9, 0.2, "growth up to `at_change`", default=0.0, starts=(-0.2, 0.2)),
+                Parameter("at_change", "N", 1e-3, 1e9, 50.0, "all change of the load when C holds", fixed=True),
+                Parameter("at_force", "N", 1e-3, 1e6, 5.0, "a hundredth of it slips", fixed=True),
+            ),
+            sought=False,
+            blocks={"frame": loosening},
             state=(0.0, 0.0),
         ),
         Form(

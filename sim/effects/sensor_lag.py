@@ -22,6 +22,8 @@ value. Each is exact for a force that is linear between samples, at any spacing.
   Processing, 3rd ed., Prentice Hall, 2010, chapter 7).
 - `throttled`: 1/(1 + τ(1 − u)s) as the force rises and 1/(1 + τ(1 + u)s) as it falls, as of a hydraulic cell behind a
   throttle with a valve (Doebelin, chapter 6). A step that begins on one side of the force ends on it.
+- `loaded`: one pole of the time τ e^(growth (y/at_force − 1)), which goes with the force y that is there: air in a cell
+  of oil gives way the less, the more it bears (H. E. Merritt, Hydraulic Control Systems, Wiley, 1967, section 1.3).
 
 Reference: E. O. Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3 (first
 and second order instruments and their response to a ramp); A. I. Zverev, Handbook of Filter Synthesis, Wiley, 1967
@@ -76,6 +78,20 @@ def throttled(dt: float, u: float, state: State, p: State) -> float:
     else:
         rises = 0.5 * (state[_LAST] + u) > state[_Y]
         y = lagged(dt, state[_Y], state[_LAST], u, p[0] * (1.0 - p[1] if rises else 1.0 + p[1]))
+        state[_Y] = y
+    state[_LAST] = u
+    return state[_Y]
+
+
+@block
+def loaded(dt: float, u: float, state: State, p: State) -> float:
+    """One pole, whose time goes with the force; p = (time_constant, growth, at_force)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+    else:
+        borne = min(max(state[_Y] / p[2], 0.0), 2.0)
+        y = lagged(dt, state[_Y], state[_LAST], u, p[0] * math.exp(p[1] * (borne - 1.0)))
         state[_Y] = y
     state[_LAST] = u
     return state[_Y]
@@ -392,6 +408,20 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"sensor": throttled},
+            state=(0.0,) * 3,
+        ),
+        Form(
+            name="loaded",
+            what="one pole, quicker or slower under load",
+            parameters=(
+                _TIME_CONSTANT,
+                Parameter(
+                    "growth", "1", -2.0, 2.0, 0.4, "of its logarithm, from no load on", default=0.0, starts=(-0.7, 0.7)
+                ),
+                Parameter("at_force", "N", 1e-3, 1e5, 5.0, "force at which the time is as stated", fixed=True),
+            ),
+            sought=False,
+            blocks={"sensor": loaded},
             state=(0.0,) * 3,
         ),
     ),

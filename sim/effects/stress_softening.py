@@ -59,6 +59,25 @@ def exponential(dt: float, depth: float, state: State, p: State) -> float:
     return 1.0 + p[0] * math.expm1(-(state[0] - here) / p[1])
 
 
+_GONE_BACK = 0.05  # of the deepest depth: the way back after which the curve of the virgin pad is met further on
+
+
+@block
+def rejoining(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (share, depth, further, already); state: deepest point, depth before, way gone back."""
+    here = max(depth, 0.0)
+    state[2] += max(state[1] - here, 0.0)
+    state[1] = here
+    state[0] = max(state[0], p[3])
+    back = min(state[2] / max(_GONE_BACK * state[0], 1e-9), 1.0)
+    met = state[0] * (1.0 + p[2] * back)
+    if here >= met:
+        state[0] = here
+        state[2] = 0.0
+        met = here
+    return 1.0 + p[0] * math.expm1(-(met - here) / p[1])
+
+
 @block
 def linear(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (share, depth, already)."""
@@ -213,6 +232,19 @@ EFFECT = Effect(
             parameters=(_SHARE, _DEPTH, _ALREADY),
             blocks={"elastic": exponential},
             state=(0.0,),
+        ),
+        Form(
+            name="rejoining",
+            what="as exponential, until a little deeper than the deepest point",
+            parameters=(
+                _SHARE,
+                _DEPTH,
+                Parameter("further", "1", 0.0, 0.3, 0.08, "how much deeper, of the deepest point", starts=(0.08,)),
+                _ALREADY,
+            ),
+            sought=False,
+            blocks={"elastic": rejoining},
+            state=(0.0, 0.0, 0.0),
         ),
         Form(
             name="linear",

@@ -20,6 +20,8 @@ on it, and not at an end that none was seen at.
 - `thermal`: coefficient · SPEED_MM_S asinh(v/v_0)/asinh(SPEED_MM_S/v_0), of bonds that heat breaks and load helps:
   linear under v_0, then as its logarithm (H. Eyring, Viscosity, plasticity, and diffusion as examples of absolute
   reaction rates, J. Chem. Phys. 4, 1936, 283–291).
+- `plastic`: the same, times the share of the elastic force that `with_load` has: a flow stress by the logarithm of the
+  rate (G. R. Johnson, W. H. Cook, Fracture characteristics of three metals, Eng. Fract. Mech. 21, 1985, 31–48).
 - `one_sided`: coefficient · (1 + differs · sgn v) v: more on the way in than on the way out, or less; `coefficient` is
   the mean of both.
 """
@@ -57,6 +59,20 @@ def _speed(
     return (speed if speed * mean > 0.0 else 0.0), mean, dt, bent
 
 
+@compiled("float64(float64, float64, float64)")
+def _of_the_load(depth: float, growth: float, at_depth: float) -> float:
+    """Elastic force over that at a depth, of a law that grows exponentially."""
+    if growth == 0.0:
+        return max(depth, 0.0) / at_depth
+    return math.expm1(growth * max(depth, 0.0)) / math.expm1(growth * at_depth)
+
+
+@compiled("float64(float64, float64)")
+def _of_bonds(speed: float, linear_to: float) -> float:
+    """Speed (mm/s) at which what is linear resists as bonds do that heat breaks; the same at `SPEED_MM_S`."""
+    return SPEED_MM_S * math.asinh(speed / linear_to) / math.asinh(SPEED_MM_S / linear_to)
+
+
 @block
 def linear(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot; p = (coefficient,)."""
@@ -86,8 +102,7 @@ def with_load(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot that grows with the elastic force; p = (coefficient, growth, at_depth)."""
     speed, state[1], state[2], state[3] = _speed(dt, depth, state[0], state[1], state[2], state[3])
     state[0] = depth
-    share = math.expm1(p[1] * max(depth, 0.0)) / math.expm1(p[1] * p[2]) if p[1] != 0.0 else depth / p[2]
-    return float(p[0] * share * speed)
+    return p[0] * _of_the_load(depth, p[1], p[2]) * speed
 
 
 @block
@@ -104,7 +119,15 @@ def thermal(dt: float, depth: float, state: State, p: State) -> float:
     """Dashpot of thermally broken bonds; p = (coefficient, linear_to)."""
     speed, state[1], state[2], state[3] = _speed(dt, depth, state[0], state[1], state[2], state[3])
     state[0] = depth
-    return p[0] * SPEED_MM_S * math.asinh(speed / p[1]) / math.asinh(SPEED_MM_S / p[1])
+    return p[0] * _of_bonds(speed, p[1])
+
+
+@block
+def plastic(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot of such bonds that grows with the elastic force; p = (coefficient, linear_to, growth, at_depth)."""
+    speed, state[1], state[2], state[3] = _speed(dt, depth, state[0], state[1], state[2], state[3])
+    state[0] = depth
+    return p[0] * _of_the_load(depth, p[2], p[3]) * _of_bonds(speed, p[1])
 
 
 @block
@@ -124,6 +147,8 @@ def _coefficient(what: str) -> Parameter:
     )
 
 
+_GROWTH = Parameter("growth", "1/mm", -2.0, 10.0, 0.7, "exponential growth with depth", starts=(0.3, 1.0))
+_LINEAR_TO = Parameter("linear_to", "mm/s", 0.1, 200.0, 10.0, "speed to which it is linear", starts=(3.0, 15.0))
 _AT_DEPTH = Parameter("at_depth", "mm", 1e-3, 100.0, 1.0, "depth at which the coefficient holds", fixed=True)
 
 EFFECT = Effect(
@@ -156,7 +181,7 @@ EFFECT = Effect(
             what="in proportion to speed and to a stiffness that grows with depth",
             parameters=(
                 _coefficient("force per speed at `at_depth`"),
-                Parameter("growth", "1/mm", -2.0, 10.0, 0.7, "exponential growth with depth", starts=(0.3, 1.0)),
+                _GROWTH,
                 _AT_DEPTH,
             ),
             blocks={"contact": with_stiffness},
@@ -167,7 +192,7 @@ EFFECT = Effect(
             what="in proportion to speed and to an elastic force that grows exponentially with depth",
             parameters=(
                 _coefficient("force per speed at `at_depth`"),
-                Parameter("growth", "1/mm", -2.0, 10.0, 0.7, "exponential growth with depth", starts=(0.3, 1.0)),
+                _GROWTH,
                 _AT_DEPTH,
             ),
             sought=False,
@@ -189,10 +214,23 @@ EFFECT = Effect(
             what="in proportion to slow speeds, and to the logarithm of quick ones",
             parameters=(
                 _coefficient("force over speed at 20 mm/s"),
-                Parameter("linear_to", "mm/s", 0.1, 200.0, 10.0, "speed to which it is linear", starts=(3.0, 15.0)),
+                _LINEAR_TO,
             ),
             sought=False,
             blocks={"contact": thermal},
+            state=_RESTING,
+        ),
+        Form(
+            name="plastic",
+            what="with the elastic force and the logarithm of the speed",
+            parameters=(
+                _coefficient("force over speed at 20 mm/s and `at_depth`"),
+                _LINEAR_TO,
+                _GROWTH,
+                _AT_DEPTH,
+            ),
+            sought=False,
+            blocks={"contact": plastic},
             state=_RESTING,
         ),
         Form(

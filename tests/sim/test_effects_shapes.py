@@ -326,3 +326,64 @@ def test_a_drift_that_a_device_sets_to_zero_at_times() -> None:
     assert_allclose(
         np.interp([0.0, 10.0, 19.9, 20.1, 35.0, 45.0], t, zero), 0.002 * np.array([0, 10, 19.9, 0.1, 15, 5])
     )
+
+
+def test_a_cell_with_air_is_quicker_under_load() -> None:
+    """Small steps at a high, at the stated and at no load: each ends as a lag of its own time does."""
+    t = np.arange(0.0, 0.3, 0.0005)
+    for level, times in ((0.0, math.exp(0.6)), (5.0, 1.0), (10.0, math.exp(-0.6)), (25.0, math.exp(-0.6))):
+        force = level + 1e-4 * (t >= 0.1)
+        loaded = active("sensor_lag", "loaded", time_constant=0.02, growth=-0.6, at_force=5.0)
+        left = (level + 1e-4 - sense(loaded, t, force)[t > 0.1]) / 1e-4
+        wanted = np.exp(-(t[t > 0.1] - 0.1) / (0.02 * times))
+        assert_allclose(left, wanted, atol=0.03)
+    assert_allclose(sense(loaded, t, np.full(t.size, 3.0)), 3.0)
+
+
+def test_relaxation_that_follows_the_depth_late() -> None:
+    block = effect("depth_dependent_relaxation").form("late").blocks["rate"]
+    t = np.arange(0.0, 3.0, 0.01)
+    depth, state, p = np.where(t < 1.5, np.clip(4.0 * t, -1.0, 2.0), -1.0), np.zeros(2), np.array([0.4, 0.3])
+    factor = np.array([block(0.01 if s else 0.0, d, state, p) for s, d in zip(t, depth, strict=True)])
+    felt = lsim(([1.0], [0.3, 1.0]), np.maximum(depth, 0.0), t)[1]
+    assert_allclose(factor, 1.0 + 0.4 * felt, rtol=1e-6)
+
+
+def test_a_flow_stress_by_the_logarithm_of_the_rate() -> None:
+    """In the middle of ramps in and out; half as deep it is as much as the elastic force is there."""
+    for speed in (2.0, 20.0, 80.0):
+        step_s = 2.0 / (200.0 * speed)
+        x = np.concatenate([np.linspace(0.0, 2.0, 201), np.linspace(2.0, 0.0, 201)[1:]])
+        t = step_s * np.arange(x.size)
+        flows = active("viscous_damping", "plastic", coefficient=0.01, linear_to=3.0, growth=0.8, at_depth=1.0)
+        more = simulate(LINEAR, [flows], t, x) - K * x
+        at_one = 0.01 * 20.0 * np.arcsinh(speed / 3.0) / np.arcsinh(20.0 / 3.0)
+        half = np.expm1(0.4) / np.expm1(0.8)
+        assert_allclose(more[[50, 100, 300, 350]], np.array([half, 1.0, -1.0, -half]) * at_one, rtol=1e-6)
+
+
+def test_a_clamp_that_each_change_of_the_load_loosens() -> None:
+    """Between 0 and 5 N, again and again; what is below a hundredth of 5 N slips nowhere."""
+    block = effect("frame_compliance").form("loosening").blocks["frame"]
+    load = np.concatenate(
+        [np.interp(np.arange(601.0), 100.0 * np.arange(7), [0, 5, 0, 5, 0, 5, 0]), 0.04 * np.eye(50)[0]]
+    )
+    state, p = np.zeros(2), np.array([0.01, 0.2, 15.0, 5.0])
+    gives = np.array([block(0.1, f, state, p) for f in load])
+    # Of each way the first 0.05 N, or where it has turned 0.1 N, loosen nothing.
+    changed = 4.95 + 4.9 * np.arange(5.0)
+    crests = [100, 300, 500]
+    assert_allclose(gives[crests], 0.01 * (1.0 + 0.2 * (changed[[0, 2, 4]] / 15.0 - 1.0)) * 5.0, rtol=1e-9)
+    assert gives[0] == 0.0 and abs(state[1] - changed[4] - 4.9) < 1e-9
+
+
+def test_softening_until_a_little_beyond_the_deepest_point() -> None:
+    x = np.interp(np.arange(701.0), [0.0, 200.0, 300.0, 500.0, 600.0, 700.0], [0.0, 2.0, 1.0, 3.0, 2.99, 3.0])
+    soft = active("stress_softening", "rejoining", share=0.3, depth=0.5, further=0.1)
+    factor = simulate(LINEAR, [soft], np.arange(x.size, dtype=float), x)[1:] / (K * x[1:])
+    assert_allclose(factor[:199], 1.0)
+    back = np.s_[215:410]
+    assert_allclose(factor[back], 1.0 - 0.3 * -np.expm1(-(2.2 - x[1:][back]) / 0.5))
+    assert_allclose(factor[425:499], 1.0)
+    # A fifteenth of the way that it takes, and not more than that further.
+    assert_allclose(factor[-2:], 1.0 - 0.3 * -np.expm1(-(3.0 * (1.0 + 0.1 / 15.0) - x[-2:]) / 0.5))

@@ -22,7 +22,7 @@ from sim.relaxation import Relaxation
 )
 def test_ringing_is_sought_at_all_frequencies_that_the_data_can_show(form, rate_Hz):
     """Down to data so slow that no usual start lies within what they show."""
-    reach = Reach(sample_s=1 / rate_Hz, span_s=60.0, travel_mm=3.0, depth_mm=2.5, force_N=5.0)
+    reach = Reach(sample_s=1 / rate_Hz, span_s=60.0, travel_mm=3.0, depth_mm=2.5, force_N=5.0, changes_N=60.0)
     shape = narrowed(effect("resonance").form(form), reach)
     starts = list(_scanned(shape))
     found = np.unique([values["frequency"] for values in starts])
@@ -71,7 +71,7 @@ def test_another_shape_has_the_numbers_that_it_shares_with_the_one_found():
 
 @pytest.mark.parametrize("force_N", [0.5, 50.0])
 def test_a_joint_opens_or_closes_within_the_forces_that_were_met(force_N):
-    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=3.0, depth_mm=2.5, force_N=force_N)
+    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=3.0, depth_mm=2.5, force_N=force_N, changes_N=60.0)
     for form in ("joint", "closing"):
         preload = next(
             p for p in narrowed(effect("frame_compliance").form(form), reach).parameters if p.name == "preload"
@@ -81,7 +81,9 @@ def test_a_joint_opens_or_closes_within_the_forces_that_were_met(force_N):
 
 @pytest.mark.parametrize("travel_mm", [0.3, 3.0])
 def test_a_pull_reaches_no_further_than_the_way_on_which_it_is_seen(travel_mm):
-    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=travel_mm, depth_mm=0.8 * travel_mm, force_N=5.0)
+    reach = Reach(
+        sample_s=0.01, span_s=60.0, travel_mm=travel_mm, depth_mm=0.8 * travel_mm, force_N=5.0, changes_N=60.0
+    )
     for form in effect("adhesion").forms:
         pull = next(p for p in narrowed(form, reach).parameters if p.name == "range")
         assert max(pull.starts) <= pull.upper <= travel_mm
@@ -89,7 +91,7 @@ def test_a_pull_reaches_no_further_than_the_way_on_which_it_is_seen(travel_mm):
 
 def test_what_was_pressed_before_as_deep_as_the_run_goes_does_not_soften_in_it():
     """It is a law then, of which these data see no other branch."""
-    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=2.0, depth_mm=1.5, force_N=5.0)
+    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=2.0, depth_mm=1.5, force_N=5.0, changes_N=60.0)
     form = narrowed(effect("stress_softening").form("preconditioned"), reach)
     already = next(p for p in form.parameters if p.name == "already")
     assert already.upper < 1.5 and already.starts and max(already.starts) <= already.upper

@@ -17,7 +17,7 @@ from bench.diagnose.sieve import repeating_first
 from sim.effects import effect
 
 DEPTH_mm = np.concatenate([np.linspace(0.0, 3.0, 400), np.linspace(3.0, 0.0, 200)])
-REACH = Reach(sample_s=0.005, span_s=60.0, travel_mm=3.0, depth_mm=3.0, force_N=5.0)
+REACH = Reach(sample_s=0.005, span_s=60.0, travel_mm=3.0, depth_mm=3.0, force_N=5.0, changes_N=60.0)
 
 
 def _wave(period_mm: float, phase_rad: float) -> np.ndarray:
@@ -70,7 +70,7 @@ def test_starts_are_apart_and_within_bounds():
 
 def test_an_error_of_the_position_repeats_within_the_depth():
     """In air no force shows it, however far the axis travels there."""
-    far = Reach(sample_s=0.005, span_s=60.0, travel_mm=9.0, depth_mm=3.0, force_N=5.0)
+    far = Reach(sample_s=0.005, span_s=60.0, travel_mm=9.0, depth_mm=3.0, force_N=5.0, changes_N=60.0)
     longest = next(p for p in narrowed(effect("encoder_error").forms[0], far).parameters if p.name == "period").upper
     assert longest < 3.0
 
