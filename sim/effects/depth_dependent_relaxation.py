@@ -180,7 +180,6 @@ EFFECT = Effect(
                 _SLOPE,
                 Parameter("time_constant", "s", 1e-2, 1e3, 0.5, "how late it is followed", starts=(0.2, 1.0)),
             ),
-            sought=False,
             blocks={"rate": late},
             state=(0.0, 0.0),
         ),

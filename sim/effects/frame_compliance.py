@@ -230,7 +230,6 @@ EFFECT = Effect(
                 Parameter("at_change", "N", 1e-3, 1e9, 50.0, "all change of the load when C holds", fixed=True),
                 Parameter("at_force", "N", 1e-3, 1e6, 5.0, "a hundredth of it slips", fixed=True),
             ),
-            sought=False,
             blocks={"frame": loosening},
             state=(0.0, 0.0),
         ),
