@@ -1,12 +1,11 @@
 """The judge's shapes: faults of the force channel.
 
-Sources: R. J. Widlar, New developments in IC voltage regulators, IEEE J. Solid-State Circuits 6 (1971) 2, of outputs
-that fold back under overload; J. C. R. Bennett, C. Partridge and N. Shectman, Packet reordering is not pathological
-network behavior, IEEE/ACM Trans. Netw. 7 (1999) 789, of what comes in too late; C. E. R. Bruce and R. H. Golde, The
-lightning discharge, J. IEE 88 (1941) 487, whose two exponentials surges have (IEC 61000-4-5); M. H. J. Bollen,
-Understanding Power Quality Problems (2000), of supplies that dip where a motor draws most; N. Golmie, R. E. Van Dyck,
-A. Soltanian, A. Tonnerre and O. Rébala, Interference evaluation of Bluetooth and IEEE 802.11b systems, Wirel. Netw. 9
-(2003) 201, of packets that are lost as a whole.
+Sources: the foldback current limiting of voltage regulators, of outputs that fall again under overload; J. C. R.
+Bennett, C. Partridge and N. Shectman, Packet reordering is not pathological network behavior, IEEE/ACM Trans. Netw. 7
+(1999) 789, of what comes in too late; C. E. R. Bruce and R. H. Golde, The lightning discharge, J. IEE 88 (1941) 487,
+whose two exponentials are taken for surges; M. H. J. Bollen, Understanding Power Quality Problems (2000), of supplies
+that dip where a motor draws most; N. Golmie, R. E. Van Dyck, A. Soltanian, A. Tonnerre and O. Rébala, Interference
+evaluation of Bluetooth and IEEE 802.11b systems, Wirel. Netw. 9 (2003) 201, of packets that are lost as a whole.
 """
 
 from __future__ import annotations

@@ -7,10 +7,10 @@ analysis of the properties of median filters, IEEE Trans. ASSP 29 (1981); E. And
 125 (1930), for oil that thins as it warms; W. Leland, M. Taqqu, W. Willinger and D. Wilson, On the self-similar nature
 of Ethernet traffic, IEEE/ACM Trans. Netw. 2 (1994); J. Dunnicliff, Geotechnical Instrumentation for Monitoring Field
 Performance (1988), vibrating wires; C. Pascoe, Time, technology and leaping seconds (Google 2011), smeared leaps; J.
-Barnes and D. Allan, A statistical model of flicker noise, Proc. IEEE 54 (1966); K. Hoffmann, An Introduction to Stress
-Analysis using Strain Gauges (1989), zeros that are strained away; I. Langmuir, The evaporation of small spheres, Phys.
-Rev. 12 (1918); G. Uhlenbeck and L. Ornstein, On the theory of the Brownian motion, Phys. Rev. 36 (1930); IEC
-61000-4-15, flicker of arc furnaces.
+Barnes and D. Allan, A statistical model of flicker noise, Proc. IEEE 54 (1966); K. Hoffmann, An Introduction to
+Measurements using Strain Gages (1989), zeros that are strained away; I. Langmuir, The evaporation of small spheres,
+Phys. Rev. 12 (1918); G. Uhlenbeck and L. Ornstein, On the theory of the Brownian motion, Phys. Rev. 36 (1930); the
+flicker of arc furnaces, for which there are flickermeters (IEC 61000-4-15).
 """
 
 from __future__ import annotations
