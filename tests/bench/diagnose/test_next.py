@@ -124,7 +124,7 @@ def test_a_drift_that_settles_at_once_is_a_bias():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("true", ["force_delay", "contact_offset"])
+@pytest.mark.parametrize("true", [pytest.param("force_delay", marks=pytest.mark.long), "contact_offset"])
 def test_the_next_test_names_the_right_one(true):
     """A staircase leaves look-alikes in doubt; the run proposed then tells."""
     first = case(true, seed=21, rate_hz=508.0)

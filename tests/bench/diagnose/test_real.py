@@ -71,6 +71,7 @@ def test_an_axis_is_given_the_names_of_a_bench() -> None:
 
 
 @measured
+@pytest.mark.long
 def test_tanks_are_given_no_name_of_a_pad() -> None:
     found = of("cascaded_tanks", "cts.csv")
     assert found.diagnosis is not None and found.diagnosis.verdict == "unexplained"

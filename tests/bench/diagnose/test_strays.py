@@ -40,6 +40,7 @@ def test_what_a_motion_makes_in_a_sample_or_two_is_no_stray():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_mode_beyond_half_the_rate_of_sampling_is_found():
     """Some 110 to 200 Hz at 200 samples a second; the fastest may be too little to be seen."""
     found = [d.causes[0].id if d.causes else "" for _, d in said("resonance", "second_order", 0.15, "rich", 200.0)]
