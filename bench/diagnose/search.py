@@ -18,7 +18,7 @@ from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import departed, families
-from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, repeating_first
+from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, repeating_first
 
 Array = NDArray[np.float64]
 
@@ -206,10 +206,13 @@ class Search(Sieve):
 
     def _in_shape(self, now: Fit, ranked: list[Trial], first: bool, anyway: bool) -> list[Trial]:
         """The best and those near it with the causes in their best shapes, where the best leaves something that tells
-        them apart and another comes in front so, or a further cause leaves next to nothing; or `anyway`."""
+        them apart, or is a law drawn through points, and another comes in front so, or a further cause leaves next to
+        nothing; or `anyway`."""
         best = ranked[0]
         near = [t for t in ranked[1:] if t.id in self._near(now, ranked)]
-        if not anyway and (not near or unexplained(best.fit.chi2, self.expected) <= 0.0):
+        # a curve through points is that of any other cause but for crumbs
+        told = unexplained(best.fit.chi2, self.expected) > 0.0 or drawn(best)
+        if not anyway and not (near and told):
             return ranked
         with ThreadPoolExecutor(WORKERS) as pool:
             shaped = list(pool.map(self._shaped, [best, *near]))

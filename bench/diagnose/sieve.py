@@ -342,14 +342,15 @@ def repeating_first(fit: Fit, ranked: list[Trial]) -> list[Trial]:
     On a pad that stays put the two are the same function of the position, and a curve through points can be any; that
     it comes out as a wave of more than one period tells of the encoder, and not of a pad.
     """
-    if not ranked or not _drawn(ranked[0]):
+    if not ranked or not drawn(ranked[0]):
         return ranked
     gained = fit.chi2 - ranked[0].fit.chi2
     wave = next((t for t in ranked[1:] if _repeats(t) and fit.chi2 - t.fit.chi2 > AS_A_WAVE * gained), None)
     return ranked if wave is None else [wave, *(t for t in ranked if t is not wave)]
 
 
-def _drawn(trial: Trial) -> bool:
+def drawn(trial: Trial) -> bool:
+    """Whether its cause is a law drawn through points, which can be any curve."""
     return trial.id == "elastic_law" and trial.cause.form.name.endswith("spline")
 
 

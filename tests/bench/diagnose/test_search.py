@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -115,6 +116,26 @@ def test_two_of_a_kind_whose_numbers_are_not_the_same_stay_two():
 def test_a_further_cause_that_leaves_nothing_stands_against_a_shape_that_fits_worse(after, reshaped, alone):
     judged = SimpleNamespace(expected=1000.0, prepared=SimpleNamespace(memory=1.0))
     assert Search._alone_clean(judged, 1300.0, after, reshaped) is alone
+
+
+@pytest.mark.parametrize(("form", "asked"), [("spline", True), ("power", False)])
+def test_a_curve_through_points_that_leaves_nothing_stands_against_its_rivals_in_their_best_shapes(form, asked):
+    """It can be nearly any curve, and what it leaves is within what is allowed: another's shape may be the curve."""
+
+    def trial(id: str, form: str, chi2: float) -> Any:
+        effect = effects.effect(id)
+        cause = cause_of(effect, next(f for f in effect.forms if f.name == form))
+        return SimpleNamespace(id=id, cause=cause, fit=SimpleNamespace(chi2=chi2), score=chi2)
+
+    law, wave = trial("elastic_law", form, 1010.0), trial("encoder_error", "harmonics", 9000.0)
+    begun: Any = SimpleNamespace(
+        expected=1000.0,
+        prepared=SimpleNamespace(memory=1.0),
+        _near=lambda now, ranked: ["encoder_error"],
+        _shaped=lambda t: trial("encoder_error", "two_periods", 800.0) if t is wave else t,
+    )
+    now: Any = SimpleNamespace(chi2=1e5)
+    assert Search._in_shape(begun, now, [law, wave], True, False)[0].id == ("encoder_error" if asked else law.id)
 
 
 def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
