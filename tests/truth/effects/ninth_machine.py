@@ -1,4 +1,4 @@
-"""The judge's shapes of what lies between the motor and the pad.
+"""The ninth shapes of what lies between the motor and the pad.
 
 Sources: J. O. Almen and A. László, The uniform-section disk spring, Trans. ASME 58 (1936) 305; D. R. Otis and A.
 Pourmovahed, An algorithm for computing nonflow gas processes in gas springs and hydropneumatic accumulators, J. Dyn.
@@ -29,7 +29,7 @@ from scipy.special import j1
 
 from ..laws import Law, _Tabulated
 from .eighth_machine import _yields
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .third_machine import _fundamental, _sliding
 
 _GAMMA = 1.4
@@ -57,7 +57,7 @@ def _gas(pressure, h, tau):
     return out
 
 
-@judge_shapes("frame_compliance", "disc_spring", "gas_strut")
+@more_shapes("frame_compliance", "disc_spring", "gas_strut")
 def frame_compliance(build: Build, shape: str, size: float) -> dict[str, float]:
     """Disc springs, softer the flatter, and solid once they are flat; or a strut of gas, which warms as it is pressed.
 
@@ -107,7 +107,7 @@ def _hangs(x, gap, low, high):
     return y
 
 
-@judge_shapes("backlash", "coasts", "hangs")
+@more_shapes("backlash", "coasts", "hangs")
 def backlash(build: Build, shape: str, size: float) -> dict[str, float]:
     """The probe's side goes on by itself where the motor stops; or hangs in its nut, until the load has lifted it.
 
@@ -150,7 +150,7 @@ class Matted(_Tabulated):
         return self.law.model(depth_mm)
 
 
-@judge_shapes("contact_offset", "matted")
+@more_shapes("contact_offset", "matted")
 def contact_offset(build: Build, shape: str, size: float) -> dict[str, float]:
     """The surface lies elsewhere and is rough on all scales, so that it closes by the logarithm of the load.
 
@@ -194,7 +194,7 @@ def _rolling_ring(x, presliding, way, rolls):
     return out
 
 
-@judge_shapes("friction", "ribs", "rubber_bell", "ring_rolls")
+@more_shapes("friction", "ribs", "rubber_bell", "ring_rolls")
 def friction(build: Build, shape: str, size: float) -> dict[str, float]:
     """A wiper that snaps from rib to rib; rubber, which rubs most at some speed; or a ring that rolls before it slides.
 
@@ -261,7 +261,7 @@ def _hardens(a, h, omega, damping, way):
     return out
 
 
-@judge_shapes("inertia", "surge", "hard_mount")
+@more_shapes("inertia", "surge", "hard_mount")
 def inertia(build: Build, shape: str, size: float) -> dict[str, float]:
     """A long soft spring or hose that hangs free, with waves in it; or a part on a mount that hardens.
 
@@ -296,7 +296,7 @@ def _leans(angle: np.ndarray, give: float) -> np.ndarray:
     return np.sin(at)
 
 
-@judge_shapes("cogging", "leans", "demagnetised")
+@more_shapes("cogging", "leans", "demagnetised")
 def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     """A coupling gives way to the ripple, which leans; or magnets that lose strength, for good, with the load borne.
 
@@ -322,7 +322,7 @@ def cogging(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"amplitude": amplitude, "period": period}
 
 
-@judge_shapes("encoder_error", "old_map", "in_turn")
+@more_shapes("encoder_error", "old_map", "in_turn")
 def encoder_error(build: Build, shape: str, size: float) -> dict[str, float]:
     """A map of the error that has shifted since it was taken, at few points; or sine and cosine that are read in turn.
 

@@ -1,4 +1,4 @@
-"""The judge's shapes of what lies between the motor and the pad against closed forms."""
+"""The ninth shapes of what lies between the motor and the pad against closed forms."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from scipy.special import jv
 
 from .cases import draw_case
-from .effects.judge_machine import Matted, _coasts, _flattens, _gas, _hangs, _hardens, _leans, _ribs, _surges
+from .effects.ninth_machine import Matted, _coasts, _flattens, _gas, _hangs, _hardens, _leans, _ribs, _surges
 from .laws import Power
 from .motion import Path
 from .sets import shapes_of
@@ -17,11 +17,11 @@ OTHERS = ("friction", "adhesion", "viscous_damping", "stress_softening", "damage
 FRAMES = ("disc_spring", "gas_strut")
 
 
-def test_they_are_of_the_judge():
-    assert set(FRAMES) <= set(shapes_of("frame_compliance", "judge"))
-    assert set(shapes_of("friction", "judge")) >= {"ribs", "rubber_bell", "ring_rolls"}
+def test_they_are_of_the_ninth():
+    assert set(FRAMES) <= set(shapes_of("frame_compliance", "ninth"))
+    assert set(shapes_of("friction", "ninth")) >= {"ribs", "rubber_bell", "ring_rolls"}
     for id in ("backlash", "inertia", "cogging", "encoder_error"):
-        assert len(shapes_of(id, "judge")) >= 2
+        assert len(shapes_of(id, "ninth")) >= 2
 
 
 def test_a_disc_that_is_pressed_flat():

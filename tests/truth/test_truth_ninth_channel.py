@@ -1,10 +1,10 @@
-"""The judge's shapes of the channel's faults, against closed forms and counts."""
+"""The ninth shapes of the channel's faults, against closed forms and counts."""
 
 import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_channel import impulse, resets
+from .effects.ninth_channel import impulse, resets
 from .effects.registry import SATURATION, Samples
 from .sets import shapes_of
 from .test_truth_effects import hidden
@@ -12,9 +12,9 @@ from .test_truth_eighth_channel import runs
 from .test_truth_fourth_signal import MANY
 
 
-def test_they_are_of_the_judge():
-    assert "folds_back" in shapes_of("saturation", "judge")
-    assert len(shapes_of("outliers", "judge")) >= 2 and len(shapes_of("stuck_samples", "judge")) >= 2
+def test_they_are_of_the_ninth():
+    assert "folds_back" in shapes_of("saturation", "ninth")
+    assert len(shapes_of("outliers", "ninth")) >= 2 and len(shapes_of("stuck_samples", "ninth")) >= 2
 
 
 @pytest.mark.parametrize("seed", range(3))

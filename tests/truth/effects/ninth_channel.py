@@ -1,4 +1,4 @@
-"""The judge's shapes: faults of the force channel.
+"""The ninth shapes: faults of the force channel.
 
 Sources: the foldback current limiting of voltage regulators, of outputs that fall again under overload; J. C. R.
 Bennett, C. Partridge and N. Shectman, Packet reordering is not pathological network behavior, IEEE/ACM Trans. Netw. 7
@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, judge_shapes
+from .registry import OUTLIERS, SATURATION, STUCK, Build, Samples, more_shapes
 
 
-@judge_shapes("saturation", "folds_back")
+@more_shapes("saturation", "folds_back")
 def saturation(build: Build, shape: str, size: float) -> dict[str, float]:
     """Beyond the limit the output falls again, by 0.08 to 0.25 of what is too much."""
     share = max(1 - 0.2 * size * float(build.rng.uniform(0.8, 1.2)), 0.3)
@@ -40,7 +40,7 @@ def impulse(time_s: np.ndarray, falls_s: float) -> np.ndarray:
     return (np.exp(-since) - np.exp(-10 * since)) / most
 
 
-@judge_shapes("outliers", "stale", "surges")
+@more_shapes("outliers", "stale", "surges")
 def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     """A value from the turn of the buffer before; or surges, which rise at once and fall within some milliseconds.
 
@@ -84,7 +84,7 @@ def resets(power: np.ndarray, level: float, length: int) -> np.ndarray:
     return np.array(begins, dtype=int)
 
 
-@judge_shapes("stuck_samples", "supply_dips", "lost_packets")
+@more_shapes("stuck_samples", "supply_dips", "lost_packets")
 def stuck_samples(build: Build, shape: str, size: float) -> dict[str, float]:
     """The supply dips where the motor draws most, and the converter starts anew; or whole packets are lost.
 

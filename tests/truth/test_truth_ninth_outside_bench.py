@@ -1,9 +1,9 @@
-"""The judge's effects of the bench outside the catalogue: each is what its docstring says."""
+"""Effects of the bench outside the catalogue: each is what its docstring says."""
 
 import numpy as np
 import pytest
 
-from .effects.judge_outside_bench import _coded, haar_kept
+from .effects.ninth_outside_bench import _coded, haar_kept
 from .motion import Path
 from .sets import SETS, shapes_of
 from .test_truth_cases import CATALOGUE
@@ -13,9 +13,9 @@ from .test_truth_third_outside import added
 MINE = ("idle_tones", "lossy_codec", "delta_code", "concealment", "railway")
 
 
-def test_they_are_of_the_judge_alone():
+def test_they_are_of_the_ninth_alone():
     assert not set(MINE) & set(CATALOGUE)
-    assert all(len(shapes_of(id, "judge")) == 2 and shapes_of(id, *SETS) == shapes_of(id, "judge") for id in MINE)
+    assert all(len(shapes_of(id, "ninth")) == 2 and shapes_of(id, *SETS) == shapes_of(id, "ninth") for id in MINE)
 
 
 def through(build, force, h=1e-4):
@@ -30,7 +30,7 @@ def frequency(off, h=1e-4):
     return (len(up) - 1) / (h * (up[-1] - up[0])) if len(up) > 1 else 0.0
 
 
-@pytest.mark.parametrize("shape", shapes_of("idle_tones", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("idle_tones", "ninth"))
 @pytest.mark.parametrize("seed", range(3))
 def test_tones_that_go_with_the_force(shape, seed):
     _, told, build = hidden("idle_tones", shape, seed=seed)
@@ -123,7 +123,7 @@ def test_ups_and_downs():
     assert np.all(_coded(np.concatenate([[1.0], np.full(9, 1.04)]), 1, 0.1, 2.0, 1.5, False) == 1.0)
 
 
-@pytest.mark.parametrize("shape", shapes_of("delta_code", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("delta_code", "ninth"))
 @pytest.mark.parametrize("seed", range(3))
 def test_a_force_as_ups_and_downs(shape, seed):
     _, told, build = hidden("delta_code", shape, seed=seed)
@@ -144,7 +144,7 @@ def test_a_force_as_ups_and_downs(shape, seed):
     assert np.max(out) > 5.0 + told["least"] and abs(out[9990] - 5.0) <= 1.001 * told["least"]
 
 
-@pytest.mark.parametrize("shape", shapes_of("concealment", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("concealment", "ninth"))
 @pytest.mark.parametrize("seed", range(3))
 def test_what_is_made_up(shape, seed):
     motion = Path(1.0).hold(60.0).motion()

@@ -1,4 +1,4 @@
-"""The judge's effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""Effects of the bench that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together. Sources: J. C. Candy and O. J. Benjamin, The
 structure of quantization noise from sigma-delta modulation, IEEE Trans. Commun. 29 (1981) 1316; N. Ahmed, T. Natarajan
@@ -20,11 +20,11 @@ from scipy.fft import dct, idct
 
 from .fourth_outside_bench import _wandering
 from .outside_bench import _AMPLIFIER, _child
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 from .sensor import _disturb
 
 
-@judge_effect("idle_tones", "rising", "folded")
+@effect("idle_tones", "rising", "folded")
 def idle_tones(build: Build, shape: str, size: float) -> dict[str, float]:
     """A converter of one bit sings: a tone whose frequency goes with the force, and whose phase adds up over time.
 
@@ -64,7 +64,7 @@ def haar_kept(blocks: np.ndarray, least: float) -> np.ndarray:
     return means
 
 
-@judge_effect("lossy_codec", "cosines", "haar")
+@effect("lossy_codec", "cosines", "haar")
 def lossy_codec(build: Build, shape: str, size: float) -> dict[str, float]:
     """The force is kept in blocks of 0.2 to 0.8 s, each as parts of which the small ones are lost, before and after.
 
@@ -116,7 +116,7 @@ def _coded(force, every, least, most, grows, syllabic):
     return out
 
 
-@judge_effect("delta_code", "one_bit_memory", "syllabic")
+@effect("delta_code", "one_bit_memory", "syllabic")
 def delta_code(build: Build, shape: str, size: float) -> dict[str, float]:
     """The force is sent as ups and downs, by steps that adapt: late and beyond as it goes quickly, unquiet at rest.
 
@@ -136,7 +136,7 @@ def delta_code(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"least": least, "every": every_s}
 
 
-@judge_effect("concealment", "fades", "goes_on")
+@effect("concealment", "fades", "goes_on")
 def concealment(build: Build, shape: str, size: float) -> dict[str, float]:
     """What is lost on the way is made up: every 0.8 to 1.6 s, at random, for 0.1 s or so, nobody says when.
 
@@ -164,7 +164,7 @@ def concealment(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"lasts": lasts_s}
 
 
-@judge_effect("railway", "axles", "rumble")
+@effect("railway", "axles", "rumble")
 def railway(build: Build, shape: str, size: float) -> dict[str, float]:
     """Trains pass the house, every 5 to 10 s for 2.5 to 5 s, and the cell feels the ground give way and shake.
 

@@ -1,4 +1,4 @@
-"""The judge's shapes of the pad's own effects.
+"""The ninth shapes of the pad's own effects.
 
 Sources: K. Kendall, Thin-film peeling: the elastic term, J. Phys. D 8 (1975); S. Niu et al., Theoretical study of
 contact-mode triboelectric nanogenerators, Energy Environ. Sci. 6 (2013); S. Poivet, F. Nallet, C. Gay and P. Fabre,
@@ -36,11 +36,11 @@ from ..laws import Law, _Tabulated
 from ..pad import Pad
 from .eighth_pad import _felt, _gap, _pad_alone, _unrelaxed
 from .outside_pad import _bonds
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .structure import hide_law
 
 
-@judge_shapes("separation", "peels")
+@more_shapes("separation", "peels")
 def separation(build: Build, shape: str, size: float) -> dict[str, float]:
     """The lab believes `bonded`. A twelfth of the surface is glued at first, and is peeled off as it is pulled at.
 
@@ -71,7 +71,7 @@ def _charge(touching, h, takes, leaks_s):
     return out
 
 
-@judge_shapes("adhesion", "charged", "viscous_film")
+@more_shapes("adhesion", "charged", "viscous_film")
 def adhesion(build: Build, shape: str, size: float) -> dict[str, float]:
     """Touches charge the surfaces, which attract each other, in contact and by the way in too; or a film is drawn.
 
@@ -130,7 +130,7 @@ class DiscSpring(_Tabulated):
         return self.modulus * x * ((self.cone - x) * (self.cone - x / 2) + 1)
 
 
-@judge_shapes("elastic_law", "crooked_walls", "disc_spring")
+@more_shapes("elastic_law", "crooked_walls", "disc_spring")
 def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     """The true law is that of the name; the believed one is fitted to it. Sizes but 1 lie between (or beyond) both."""
     rng, depth = build.rng, build.depth_mm
@@ -154,7 +154,7 @@ def _learnt(x, h, takes_s):
     return out
 
 
-@judge_shapes("stress_softening", "takes_time", "chain_limit")
+@more_shapes("stress_softening", "takes_time", "chain_limit")
 def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
     """1 − s (1 − e^{−(M − δ)/d}), where bonds take 0.1 to 0.4 s to break, so that M is short of the deepest point.
 
@@ -203,7 +203,7 @@ def lost_work(u: np.ndarray, h: float, shares: np.ndarray, rates: np.ndarray) ->
     return total * h
 
 
-@judge_shapes("damage", "crack", "by_loss")
+@more_shapes("damage", "crack", "by_loss")
 def damage(build: Build, shape: str, size: float) -> dict[str, float]:
     """A crack grows by a power of the stroke, and the faster the longer it is; or e^{−r Λ} by what the modes dissipate.
 
@@ -240,7 +240,7 @@ def _slid(x, holds):
     return out
 
 
-@judge_shapes("permanent_set", "flows_back", "two_networks")
+@more_shapes("permanent_set", "flows_back", "two_networks")
 def permanent_set(build: Build, shape: str, size: float) -> dict[str, float]:
     """It yields, hardens, and flows back in part as it is let go; or bonds form anew in whatever shape the pad has.
 
@@ -282,7 +282,7 @@ def disc_rates(rate: float, poisson: float, terms: int = 6) -> tuple[np.ndarray,
     return weights, rate * squares / squares[0]
 
 
-@judge_shapes("missing_relaxation_mode", "arm_retraction", "wet_disc")
+@more_shapes("missing_relaxation_mode", "arm_retraction", "wet_disc")
 def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, float]:
     """Branched chains whose arms draw back against a barrier of 3 to 5; or a wet disc that drains at its rim.
 
@@ -313,7 +313,7 @@ def _since_touch(x):
     return out
 
 
-@judge_shapes("depth_dependent_relaxation", "under_pressure", "stays_drained")
+@more_shapes("depth_dependent_relaxation", "under_pressure", "stays_drained")
 def depth_dependent_relaxation(build: Build, shape: str, size: float) -> dict[str, float]:
     """(1 + F/F_0)^{−c}, slower under pressure, F_0 of 0.05 to 0.3 of the greatest; or ν (1 + s m), m the deepest point.
 
@@ -362,7 +362,7 @@ def _damped(build: Build, force: Callable[[float, np.ndarray, np.ndarray], np.nd
     build.plant.gain.append(gain)
 
 
-@judge_shapes("viscous_damping", "thixotropic", "springpot")
+@more_shapes("viscous_damping", "thixotropic", "springpot")
 def viscous_damping(build: Build, shape: str, size: float) -> dict[str, float]:
     """A filling that gets thinner as it is moved, to 0.3 at most, and sets again; or C d^α δ/dt^α, α of 0.75 to 0.9.
 

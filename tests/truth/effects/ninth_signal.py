@@ -1,4 +1,4 @@
-"""The judge's shapes from the cell to the sample.
+"""The ninth shapes from the cell to the sample.
 
 Sources: force balances (E. Doebelin, Measurement Systems) and N. Hayes, Roots of the transcendental equation associated
 with a certain difference-differential equation, J. London Math. Soc. 25 (1950), for loops with a dead time; S. Masri
@@ -22,7 +22,7 @@ from numba import njit
 
 from .fourth_outside_bench import _wandering
 from .outside_bench import _child
-from .registry import Build, judge_shapes, spread
+from .registry import Build, more_shapes, spread
 from .sensor import _LAG, _RESONANCE, _disturb
 
 
@@ -80,7 +80,7 @@ def _rattles(force, h, omega, damping, mass, gap, bounces):
     return out
 
 
-@judge_shapes("resonance", "force_compensation", "impact_damper")
+@more_shapes("resonance", "force_compensation", "impact_damper")
 def resonance(build: Build, shape: str, size: float) -> dict[str, float]:
     """A cell that makes up for the force by a loop with a dead time, K e^{−s T}/(s + K e^{−s T}); or a loose mass.
 
@@ -123,7 +123,7 @@ def _thins(force, h, tau_s):
     return out
 
 
-@judge_shapes("sensor_lag", "running_median", "oil_warms")
+@more_shapes("sensor_lag", "running_median", "oil_warms")
 def sensor_lag(build: Build, shape: str, size: float) -> dict[str, float]:
     """The median of nine values; or a throttle whose oil thins as it warms, to a half or a third of the first lag.
 
@@ -159,7 +159,7 @@ def coloured(child: np.random.Generator, duration_s: float, power: float, step_s
     return lambda t: np.interp(t, step_s * np.arange(len(path)), path)
 
 
-@judge_shapes("force_delay", "self_similar", "vibrating_wire")
+@more_shapes("force_delay", "self_similar", "vibrating_wire")
 def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
     """A network busy on all scales of time alike; or a wire whose waves are counted, which swings faster under load.
 
@@ -180,7 +180,7 @@ def force_delay(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"delay": delay}
 
 
-@judge_shapes("clock_skew", "leap_smear", "flicker")
+@more_shapes("clock_skew", "leap_smear", "flicker")
 def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     """A leap that is smeared over a part of the recording, by a raised cosine; or a rate that flickers, as 1/f.
 
@@ -208,7 +208,7 @@ def clock_skew(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"skew": 1e6 * float(gained(duration)) / duration}
 
 
-@judge_shapes("force_bias", "strained")
+@more_shapes("force_bias", "strained")
 def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     """A cell that was overloaded: its zero moves by 15 to 25 % of itself as it bears what it has not borne before.
 
@@ -227,7 +227,7 @@ def force_bias(build: Build, shape: str, size: float) -> dict[str, float]:
     return told
 
 
-@judge_shapes("force_drift", "drop_dries", "draughts")
+@more_shapes("force_drift", "drop_dries", "draughts")
 def force_drift(build: Build, shape: str, size: float) -> dict[str, float]:
     """A drop on the probe dries, (2/3) r T (1 − (1 − t/T)^{3/2}), and then it is gone; or a room full of draughts.
 
@@ -251,7 +251,7 @@ def force_drift(build: Build, shape: str, size: float) -> dict[str, float]:
     return {"rate": rate}
 
 
-@judge_shapes("mains_hum", "arc_furnace")
+@more_shapes("mains_hum", "arc_furnace")
 def mains_hum(build: Build, shape: str, size: float) -> dict[str, float]:
     """An arc furnace next door: the amplitude wanders within 0.05 to 0.2 s, by 0.4 of it; stated is the mean."""
     rng, duration = build.rng, build.plant.duration_s

@@ -1,10 +1,10 @@
-"""The judge's shapes of the pad's own effects against closed forms and independent counts."""
+"""The ninth shapes of the pad's own effects against closed forms and independent counts."""
 
 import numpy as np
 import pytest
 from scipy.special import gamma
 
-from .effects.judge_pad import (
+from .effects.ninth_pad import (
     CrookedWalls,
     DiscSpring,
     _charge,
@@ -296,7 +296,7 @@ def disc_root(poisson):
     return x
 
 
-@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("missing_relaxation_mode", "ninth"))
 @pytest.mark.parametrize("seed", range(3))
 def test_what_is_added_has_its_share(shape, seed):
     pad = Pad(Power(3.0, 0.0), (0.3,), (50.0,))

@@ -1,10 +1,10 @@
-"""The judge's effects of the pad outside the catalogue: each is what its docstring says."""
+"""Effects of the pad outside the catalogue: each is what its docstring says."""
 
 import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from .effects.judge_outside_pad import (
+from .effects.ninth_outside_pad import (
     _closed_count,
     _closed_share,
     _fires,
@@ -22,9 +22,9 @@ from .test_truth_effects import hidden
 MINE = ("firing", "imprint", "catch_bonds", "regulated", "fabric")
 
 
-def test_they_are_the_judges_alone():
+def test_they_are_of_the_ninth_alone():
     assert not set(MINE) & set(CATALOGUE)
-    assert all(shapes_of(id, *SETS) == shapes_of(id, "judge") and len(shapes_of(id, "judge")) == 2 for id in MINE)
+    assert all(shapes_of(id, *SETS) == shapes_of(id, "ninth") and len(shapes_of(id, "ninth")) == 2 for id in MINE)
 
 
 # --- firing -----------------------------------------------------------------------------------------------------------
@@ -95,7 +95,7 @@ def test_a_mark_where_it_is_held():
     assert faded[at] / again[at] == pytest.approx(np.exp(-1.4 / 5.0), rel=0.12)
 
 
-@pytest.mark.parametrize("shape", shapes_of("imprint", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("imprint", "ninth"))
 @pytest.mark.parametrize("seed", range(3))
 def test_a_pad_that_remembers_depths(shape, seed):
     kept = {}
@@ -261,7 +261,7 @@ def lost(shape, seed, *depths, speed=20.0, rest=0.0):
     return (1 - fine.force_N[-1] / 5.4) / told["share"], told
 
 
-@pytest.mark.parametrize("shape", shapes_of("fabric", "judge"))
+@pytest.mark.parametrize("shape", shapes_of("fabric", "ninth"))
 @pytest.mark.parametrize("seed", range(3))
 def test_a_fabric_by_its_turns(shape, seed):
     one, told = lost(shape, seed, 1.9)

@@ -1,10 +1,10 @@
-"""The judge's shapes from the cell to the sample, against closed forms."""
+"""The ninth shapes from the cell to the sample, against closed forms."""
 
 import numpy as np
 import pytest
 
 from .cases import draw_case
-from .effects.judge_signal import _compensated, _rattles, coloured, loop_with_dead_time, running_median
+from .effects.ninth_signal import _compensated, _rattles, coloured, loop_with_dead_time, running_median
 from .motion import Path
 from .test_truth_effects import SHORT, disturbed, hidden
 from .test_truth_eighth_signal import applied

@@ -1,4 +1,4 @@
-"""The judge's effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
+"""Effects of the pad that the catalogue has no name for. A size of 1 is some 1–3 % of the force.
 
 None of them is what an id of the table means, nor two of them together. Sources: L. Lapicque, Recherches quantitatives
 sur l'excitation électrique des nerfs, J. Physiol. Pathol. Gén. 9 (1907), and E. Adrian and Y. Zotterman, The impulses
@@ -18,7 +18,7 @@ from numba import njit
 
 from .outside_bench import _child
 from .outside_pad import _added
-from .registry import Build, judge_effect, spread
+from .registry import Build, effect, spread
 
 
 @njit(cache=True)
@@ -35,7 +35,7 @@ def _fires(load, h, least, often_Hz, tires, tires_s, needs):
     return when[:n]
 
 
-@judge_effect("firing", "steady", "adapts")
+@effect("firing", "steady", "adapts")
 def firing(build: Build, shape: str, size: float) -> dict[str, float]:
     """A muscle is stung by its load: it gathers up, and at a threshold it jerks, the oftener the more it bears.
 
@@ -85,7 +85,7 @@ def _marks(x, h, pitch, width, grows_s, fades_s, rubs_mm):
     return out
 
 
-@judge_effect("imprint", "fades", "rubbed_out")
+@effect("imprint", "fades", "rubbed_out")
 def imprint(build: Build, shape: str, size: float) -> dict[str, float]:
     """A disordered pad remembers the depths at which it was held: it is stiffer just there when it passes them again.
 
@@ -137,7 +137,7 @@ def _closed_count(touching, opens, closes, h, waits):
     return out
 
 
-@judge_effect("catch_bonds", "many", "few")
+@effect("catch_bonds", "many", "few")
 def catch_bonds(build: Build, shape: str, size: float) -> dict[str, float]:
     """Bonds across the pad, which bear with it, hold longest under a middling load, and open soon under less or more.
 
@@ -182,7 +182,7 @@ def _relay(u, h, vents_at, pumps_at, per_s, leaks_per_s):
     return y
 
 
-@judge_effect("regulated", "hunts", "relay")
+@effect("regulated", "hunts", "relay")
 def regulated(build: Build, shape: str, size: float) -> dict[str, float]:
     """The pad has air in it, and a controller keeps its pressure where it is in air, whatever presses on it.
 
@@ -227,7 +227,7 @@ def _turned(depth, goes_mm, comes_mm, needs_mm):
     return out
 
 
-@judge_effect("fabric", "each_turn", "by_way_before")
+@effect("fabric", "each_turn", "by_way_before")
 def fabric(build: Build, shape: str, size: float) -> dict[str, float]:
     """Grains in a paste form chains along the way they are pressed; a turn takes them apart; new ones build up.
 
