@@ -29,6 +29,7 @@ from .hum import find as line_of
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
+from .pulses import pulses
 from .refit import Fit, extended, force_at, mean_square, onto, placed, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
@@ -69,7 +70,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     begun = time.perf_counter()
     tell = progress or (lambda _: None)
     tell("reading the channels")
-    flags = not_of_the_motion(m, faults(m.force_N))
+    flags = not_of_the_motion(m, _pulsed(m, faults(m.force_N)))
     prepared = prepare(m, flags.good)
     structure = believed_structure(believed, prepared)
     search = Search(prepared, structure, tell, ["saturation"] if flags.saturated.any() else [])
@@ -95,6 +96,12 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
         fits, squares, excess = _dropped(prepared, fits, gone, floor)
         whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
+
+
+def _pulsed(m: Measurement, flags: Faults) -> Faults:
+    """With the pulses in holds, where nothing else makes the force rise at once and go back."""
+    pulsed = pulses(m.force_N, ~flags.by_itself)
+    return replace(flags, outlier=flags.outlier | pulsed & resting(m)) if pulsed.any() else flags
 
 
 def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple[list[Fit], list[float], list[float]]:
@@ -316,6 +323,7 @@ def _asked_again(
     known = np.isfinite(errors) & ~flags.by_itself
     outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect)
     outlier &= ~of_the_model(modelled, errors, outlier)
+    outlier |= pulses(np.where(np.isfinite(errors), errors, 0.0), known)
     if outlier.sum() < FEW and not suspect.any():
         outlier &= resting(m)  # one or two in moves, in a channel without strays, are at the motion's corners
     if np.array_equal(outlier, flags.outlier):

@@ -25,6 +25,10 @@
   Solids 42, 1994, 1397–1434). z = range/3.146, as q e^(1−q) is 1/e there.
 - `even`: `pull_off` over all of the range, on both ways, and nothing beyond (D. S. Dugdale, J. Mech. Phys. Solids 8,
   1960, 100–104; D. Maugis, J. Colloid Interface Sci. 150, 1992, 243–269), rounded over a twentieth of it.
+- `charging`: each touch takes a share `takes` of the charge that is still missing, which leaks away in air within
+  `leaks`; the pull goes with its square, as that of a charged sphere, pull_off (q/(1 + gap/z))² with z as above, on the
+  way in too (R. G. Horn, D. T. Smith, Contact electrification and adhesion between dissimilar materials, Science 256,
+  1992, 362–364).
 
 `range` is the gap at which the pull has fallen to 1/e where it ends nowhere, and where it ends otherwise.
 
@@ -140,6 +144,19 @@ def even(dt: float, gap: float, state: State, p: State) -> float:
     return -p[0] * 0.5 * (1.0 - math.tanh((gap / p[1] - 1.0) / _ROUNDED))
 
 
+@block
+def charging(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range, takes, leaks); state: charge, whether it touches."""
+    if gap > 0.0:
+        state[0] *= math.exp(-dt / p[3])
+        state[1] = 0.0
+    elif state[1] == 0.0:
+        state[1] = 1.0
+        state[0] += p[2] * (1.0 - state[0])
+    pulls = state[0] / (1.0 + gap / p[1] * _ROOT)
+    return -p[0] * pulls * pulls
+
+
 _PULL_OFF = Parameter(
     "pull_off",
     "N",
@@ -237,6 +254,19 @@ EFFECT = Effect(
             sought=False,
             blocks={"gap": quick},
             state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="charging",
+            what="touches charge the surfaces, which pull on both ways",
+            parameters=(
+                _PULL_OFF,
+                _RANGE,
+                Parameter("takes", "1", 0.05, 1.0, 0.5, "share of what is missing that a touch takes", starts=(0.5,)),
+                Parameter("leaks", "s", 0.1, 1e3, 10.0, "time in which it leaks to 1/e in air", starts=(10.0,)),
+            ),
+            sought=False,
+            blocks={"gap": charging},
+            state=(0.0, 0.0),
         ),
         Form(
             name="smooth",

@@ -19,6 +19,10 @@
 - `filled`: a film of oil that motion drags in fills a share of the play, gap · (1 − film · v/(v + v_0)) at speed v (O.
   Reynolds, On the theory of lubrication, Philos. Trans. R. Soc. Lond. 177, 1886, 157–234: what a film carries grows
   with its speed). `gap` is the width at rest.
+- `lifted`: the probe's side is heavy and hangs in its nut: at a load that bears its weight, at the depth `lifts`, the
+  motor goes through the play and nothing is pressed; friction in its guide makes that `rubs` deeper on the way in, and
+  as much less deep on the way back (A. Tustin, The effects of backlash and of speed-dependent friction on the stability
+  of closed-cycle control systems, J. IEE 94, 1947, 143–151: gravity takes up the play).
 
 Reference: M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash, a survey, Automatica 38, 2002,
 1633–1649.
@@ -117,6 +121,17 @@ def filled(dt: float, x: float, state: State, p: State) -> float:
     state[2] = x
     gap = p[0] * (1.0 - p[1] * state[3] / (state[3] + p[2]))
     state[1] = min(max(state[1], x), x + gap)
+    return state[1]
+
+
+@block
+def lifted(dt: float, x: float, state: State, p: State) -> float:
+    """Probe side, from x − gap (borne) to x (hanging); p = (gap, lifts, rubs)."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[1] = x
+    state[1] = min(max(state[1], p[1] - p[2]), p[1] + p[2])  # where it slides in its guide
+    state[1] = min(max(state[1], x - p[0]), x)
     return state[1]
 
 
@@ -220,6 +235,17 @@ EFFECT = Effect(
             sought=False,
             blocks={"play": filled},
             state=(0.0,) * 4,
+        ),
+        Form(
+            name="lifted",
+            what="the load lifts what hangs in the play",
+            parameters=(
+                _GAP,
+                Parameter("lifts", "mm", 0.0, 50.0, 0.6, "depth at which the load bears its weight", bend=True),
+                Parameter("rubs", "mm", 0.0, 5.0, 0.05, "how much deeper on the way in, less deep on the way back"),
+            ),
+            blocks={"play": lifted},
+            state=(0.0, 0.0),
         ),
         Form(
             name="loaded",

@@ -16,8 +16,11 @@
   University Press, 1997).
 - `late`: 1 + slope · d, where d follows the depth with a time constant: the structure takes its time (A. J. Kovacs,
   Transition vitreuse dans les polymères amorphes, Fortschr. Hochpolym.-Forsch. 3, 1963, 394–507).
+- `drained`: 1 + slope · m, m the deepest point since the probe came from air: water that has been pressed out comes
+  back only where nothing presses (J. S. Hou, M. H. Holmes, W. M. Lai, V. C. Mow, Boundary conditions at the
+  cartilage-synovial fluid interface, J. Biomech. Eng. 111, 1989, 78–87).
 
-`linear`, `exponential`, `free_volume`, `knee` and `late` have the relative slope `slope` at the surface.
+`linear`, `exponential`, `free_volume`, `knee`, `late` and `drained` have the relative slope `slope` at the surface.
 
 Reference: R. A. Schapery, On the characterization of nonlinear viscoelastic materials, Polym. Eng. Sci. 9, 1969,
 295–310 (shift factor that depends on strain).
@@ -107,6 +110,13 @@ def late(dt: float, depth: float, state: State, p: State) -> float:
     return _kept(1.0 + p[0] * state[0])
 
 
+@block
+def drained(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on the rates; p = (slope,); state: the deepest point since the last touch."""
+    state[0] = max(state[0], depth) if depth > 0.0 else 0.0
+    return _kept(1.0 + p[0] * state[0])
+
+
 _SLOPE = Parameter(
     "slope",
     "1/mm",
@@ -172,6 +182,13 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"rate": beyond},
+        ),
+        Form(
+            name="drained",
+            what="rates linear in the deepest point since the last touch",
+            parameters=(_SLOPE,),
+            blocks={"rate": drained},
+            state=(0.0,),
         ),
         Form(
             name="late",

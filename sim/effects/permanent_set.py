@@ -13,6 +13,10 @@
 - `flowing`: by set · deepest · (1 + flows · ln(1 + T/1 s)), T the time under load (∫ depth/deepest dt): cold flow, by
   the logarithm of time as creep goes under a stress that stays (W. N. Findley, J. S. Lai, K. Onaran, Creep and
   Relaxation of Nonlinear Viscoelastic Materials, North-Holland, 1976, chapter 2).
+- `springing`: it yields beyond a depth of `limit` and hardens, and as it is let go a part flows back: 2 · set times a
+  play of ± limit that the depth drags along; `set` is the mean of what has sunk under the deepest and of what stays (W.
+  Prager, A new method of analyzing stresses and strains in work-hardening plastic solids, J. Appl. Mech. 23, 1956,
+  493–496: the back stress of what has hardened).
 
 `deepest` is in the probe's coordinate; the pad's depth is what is left above the sunken surface.
 
@@ -105,6 +109,14 @@ def flowing(dt: float, y: float, state: State, p: State) -> float:
     return float(y - min(p[0] * state[_DEEPEST] * (1.0 + p[1] * math.log1p(state[_LOADED])), state[_DEEPEST]))
 
 
+@block
+def springing(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the surface; p = (set, limit); state: the play that is dragged along."""
+    here = max(y, 0.0)
+    state[0] = max(min(state[0], here + p[1]), here - p[1])
+    return y - 2.0 * p[0] * state[0]
+
+
 _SET = Parameter(
     "set",
     "mm/mm",
@@ -161,6 +173,17 @@ EFFECT = Effect(
                 Parameter("limit", "mm", 0.0, 50.0, 0.5, "depth that leaves no trace", bend=True),
             ),
             blocks={"depth": yielding},
+            state=(0.0,),
+        ),
+        Form(
+            name="springing",
+            what="beyond a depth that leaves no trace, and back in part",
+            parameters=(
+                _SET,
+                Parameter("limit", "mm", 0.0, 50.0, 0.5, "depth that leaves no trace", bend=True),
+            ),
+            sought=False,
+            blocks={"depth": springing},
             state=(0.0,),
         ),
         Form(
