@@ -17,7 +17,7 @@ Mask = NDArray[np.bool_]
 
 BEFORE = 8  # samples before a pulse that say where the force was
 BACK = 3  # samples in a row that are there again
-LONGEST = 40  # samples of a pulse
+SHORTEST, LONGEST = 3, 40  # samples of a pulse: shorter ones are strays
 ONSET = 12.0  # noise deviations of its first sample
 ENDED = 5.0  # noise deviations within which the force is back
 STEEP = 3.0  # times what the samples before differ by
@@ -41,7 +41,10 @@ def pulses(values: Array, good: Mask) -> Mask:
         first = int(k) + BEFORE
         if first < ends:
             continue
-        ends = _end(y, first, float(level[k]), max(ENDED * noise, float(differ[k])))
+        last = _end(y, first, float(level[k]), max(ENDED * noise, float(differ[k])))
+        if last - first < SHORTEST or np.median(np.abs(y[first:last] - level[k])) < ONSET * noise:
+            continue
+        ends = last
         mask[index[first:ends]] = True
     return mask
 

@@ -8,6 +8,9 @@ from numpy.testing import assert_allclose
 from scipy.optimize import brentq
 
 from sim.effects import effect
+from sim.elastic import Exponential
+from sim.pad import Pad
+from sim.relaxation import Relaxation
 from tests.sim.effect_tools import GEL, LINEAR, SOFT, K, active, ramp, simulate
 
 
@@ -151,3 +154,44 @@ class TestAGel:
 def gel_left(time):
     """Share of the water's force that is left at Hu's time."""
     return 0.491 * np.exp(-0.908 * np.sqrt(time)) + 0.509 * np.exp(-1.679 * time)
+
+
+class TestWhatTheNinthShowed:
+    def test_a_load_that_lifts_what_hangs_in_the_play(self) -> None:
+        x = ramp(2.0, 401)
+        lifted = active("backlash", "lifted", gap=0.1, lifts=1.0, rubs=0.2)
+        force = simulate(LINEAR, [lifted], np.arange(x.size) * 0.01, x)
+        up, down = x[:401], x[400:]
+        way_in = np.where(up <= 0.8, up, np.maximum(up - 0.1, 0.8))
+        way_back = np.where(down >= 1.3, down - 0.1, np.minimum(down, 1.2))
+        assert_allclose(force[:401], K * way_in, atol=1e-9)
+        assert_allclose(force[400:], K * way_back, atol=1e-9)
+
+    def test_a_set_that_flows_back_in_part(self) -> None:
+        x = ramp(2.0, 401)
+        springs = active("permanent_set", "springing", set=0.1, limit=0.5)
+        force = simulate(LINEAR, [springs], np.arange(x.size) * 0.01, x)
+        up, down = x[:401], x[400:]
+        assert_allclose(force[:401], K * (up - 0.2 * np.maximum(up - 0.5, 0.0)), atol=1e-9)
+        sunk = 0.2 * np.minimum(1.5, down + 0.5)  # 0.3 mm under the deepest, 0.1 mm at the end: 0.1 · 2 in the mean
+        assert_allclose(force[400:], K * np.maximum(down - sunk, 0.0), atol=1e-9)
+
+    def test_water_that_stays_away_until_the_pad_is_let_go(self) -> None:
+        t = 0.01 * np.arange(6000)
+        x = np.select([t < 1.0, t < 2.0, t < 52.0], [2.0, 1.0, -1.0], 1.0)
+        drained = active("depth_dependent_relaxation", "drained", slope=0.3)
+        pad = Pad(Exponential(K, 0.0), GEL, unilateral=True)
+        force = simulate(pad, [drained], t, x)
+        for factor, part in ((1.6, t < 2.0), (1.3, t >= 51.99)):
+            quick = Pad(Exponential(K, 0.0), Relaxation(GEL.shares, tuple(factor * r for r in GEL.rates)), True)
+            alone = simulate(quick, [], t[part] - t[part][0], x[part])
+            assert_allclose(force[part], alone, rtol=1e-3)  # the factor grows along the step in which it touches
+
+    def test_surfaces_that_are_charged_by_touching(self) -> None:
+        t, x = np.arange(8.0), np.array([0.0, -0.1, -0.1, -0.1, -0.1, 0.0, 0.0, -0.1])
+        force = simulate(LINEAR, [active("adhesion", "charging", pull_off=0.2, range=0.1, takes=0.5, leaks=8.0)], t, x)
+        before = 0.5 * np.exp(-t / 8.0)
+        again = before[4] + 0.5 * (1.0 - before[4])
+        charge = np.array([*before[:5], again, again, again * math.exp(-1.0 / 8.0)])
+        # At the range 1/e of what it is in contact.
+        assert_allclose(force, -0.2 * charge**2 * np.where(x < 0.0, math.exp(-1.0), 1.0), rtol=1e-9)
