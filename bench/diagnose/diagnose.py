@@ -99,7 +99,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
 
 
 def _pulsed(m: Measurement, flags: Faults) -> Faults:
-    """With the pulses of a channel that has some in holds, where nothing else makes the force rise at once and go back."""
+    """With the pulses of a channel that has some in holds, where nothing else makes it rise at once and go back."""
     pulsed = pulses(m.force_N, ~flags.by_itself)
     return replace(flags, outlier=flags.outlier | pulsed) if (pulsed & resting(m)).sum() >= FEW else flags
 

@@ -23,6 +23,9 @@
   motor goes through the play and nothing is pressed; friction in its guide makes that `rubs` deeper on the way in, and
   as much less deep on the way back (A. Tustin, The effects of backlash and of speed-dependent friction on the stability
   of closed-cycle control systems, J. IEE 94, 1947, 143–151: gravity takes up the play).
+- `coasting`: what the motor pushes goes on by itself once that stops or turns, slowed down by dry friction at `slows`,
+  until it meets the other flank (S. Dubowsky, F. Freudenstein, Dynamic analysis of mechanical systems with clearances,
+  J. Eng. Ind. 93, 1971, 305–316).
 
 Reference: M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash, a survey, Automatica 38, 2002,
 1633–1649.
@@ -121,6 +124,23 @@ def filled(dt: float, x: float, state: State, p: State) -> float:
     state[2] = x
     gap = p[0] * (1.0 - p[1] * state[3] / (state[3] + p[2]))
     state[1] = min(max(state[1], x), x + gap)
+    return state[1]
+
+
+@block
+def coasting(dt: float, x: float, state: State, p: State) -> float:
+    """Probe side, from x to x + gap, pushed and then on by itself; p = (gap, slows). State: started, probe, x, speed."""
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[1] = state[2] = x
+    elif dt > 0.0:
+        left = max(abs(state[3]) - p[1] * dt, 0.0)
+        state[1] += 0.5 * dt * (math.copysign(left, state[3]) + state[3]) if left > 0.0 else 0.0
+        state[3] = math.copysign(left, state[3])
+    if state[1] <= x or state[1] >= x + p[0]:
+        state[1] = min(max(state[1], x), x + p[0])
+        state[3] = (x - state[2]) / dt if dt > 0.0 else 0.0
+    state[2] = x
     return state[1]
 
 
@@ -234,6 +254,17 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"play": filled},
+            state=(0.0,) * 4,
+        ),
+        Form(
+            name="coasting",
+            what="the probe's side goes on by itself where the motor stops",
+            parameters=(
+                _GAP,
+                Parameter("slows", "mm/s²", 10.0, 1e4, 400.0, "by which friction slows it down", starts=(100.0, 500.0)),
+            ),
+            sought=False,
+            blocks={"play": coasting},
             state=(0.0,) * 4,
         ),
         Form(

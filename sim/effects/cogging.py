@@ -13,6 +13,9 @@
 - `edged`: Σ r^(n−1) sin n θ, all harmonics, as of edges that are rounded over some of the period: sin θ over
   1 − 2 r cos θ + r²; `amplitude` is that of the first.
 - `warming`: the sine fades or grows in time, as magnets weaken with warmth: amplitude · (1 + growth (t − at_time)).
+- `weakening`: magnets lose strength with the load they have borne, for good: amplitude · (1 + lost (1 − m/reach)), m
+  the deepest point so far (S. Ruoho, E. Dlala, A. Arkkio, Comparison of demagnetization models for finite-element
+  analysis of permanent-magnet synchronous machines, IEEE Trans. Magn. 43, 2007, 3964–3968).
 - `creeping`: phase + creep · ∫|dy|, all the way there has been since the first sample, to and fro: a belt that creeps
   on its pulley (J. N. Fawcett, Chain and belt drives: a review, Shock Vib. Digest 13(5), 1981, 5–12).
 
@@ -57,6 +60,14 @@ def trailing(dt: float, y: float, state: State, p: State) -> float:
 def slotted(dt: float, y: float, state: State, p: State) -> float:
     """Force in N; p = (amplitude over the first harmonic of the wave, period, phase, steepness)."""
     return p[0] * math.tanh(p[3] * math.sin(2.0 * math.pi * y / p[1] + p[2]))
+
+
+@block
+def weakening(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, lost, reach); state: the deepest point so far."""
+    state[0] = min(max(state[0], y), p[4])
+    size = 1.0 + p[3] * (1.0 - state[0] / p[4])
+    return p[0] * size * math.sin(2.0 * math.pi * y / p[1] + p[2])
 
 
 @block
@@ -208,6 +219,20 @@ EFFECT = Effect(
             sought=False,
             blocks={"probe": creeping},
             state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="weakening",
+            what="a sine that the load borne weakens for good",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("lost", "1", -0.9, 5.0, 0.5, "more of it at first, relative to what is left", starts=(0.6,)),
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth that leaves no more than `amplitude`", fixed=True),
+            ),
+            sought=False,
+            blocks={"probe": weakening},
+            state=(0.0,),
         ),
         Form(
             name="warming",

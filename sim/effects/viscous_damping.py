@@ -24,6 +24,10 @@ on it, and not at an end that none was seen at.
   rate (G. R. Johnson, W. H. Cook, Fracture characteristics of three metals, Eng. Fract. Mech. 21, 1985, 31–48).
 - `one_sided`: coefficient · (1 + differs · sgn v) v: more on the way in than on the way out, or less; `coefficient` is
   the mean of both.
+- `springpot`: a fractional derivative, C d^α δ/dt^α, between a dashpot and a spring, which sin(πα)/π ∫ ν^α w dln ν makes
+  of modes w' = v − ν w, three a decade; `coefficient` is force over speed after 0.1 s of an even speed (R. L. Bagley,
+  P. J. Torvik, A theoretical basis for the application of fractional calculus to viscoelasticity, J. Rheol. 27, 1983,
+  201–210).
 """
 
 from __future__ import annotations
@@ -35,6 +39,9 @@ from sim.jit import State, block, compiled
 
 SPEED_MM_S = 20.0
 """Speed at which `coefficient` is force over speed."""
+_A_DECADE, _SLOWEST, _MODES = 3.0, 0.1, 13
+_FASTEST, _EVEN_S = 1000.0, 0.1
+"""Rates of the modes of `springpot`, 1/s; and the time of an even speed at which its coefficient is stated."""
 _SLOW = 0.05
 """Speed below which `power` is linear, mm/s: a root has no slope at rest."""
 
@@ -128,6 +135,26 @@ def plastic(dt: float, depth: float, state: State, p: State) -> float:
     speed, state[1], state[2], state[3] = _speed(dt, depth, state[0], state[1], state[2], state[3])
     state[0] = depth
     return p[0] * _of_the_load(depth, p[2], p[3]) * _of_bonds(speed, p[1])
+
+
+@block
+def springpot(dt: float, depth: float, state: State, p: State) -> float:
+    """Fractional dashpot; p = (coefficient, order). State: as of `linear`, then ways of the modes."""
+    speed, state[1], state[2], state[3] = _speed(dt, depth, state[0], state[1], state[2], state[3])
+    went = max(depth, 0.0) - max(state[0], 0.0)
+    state[0] = depth
+    order, step = p[1], math.log(10.0) / _A_DECADE
+    total = speed * (_FASTEST * math.exp(0.5 * step)) ** (order - 1.0) / (1.0 - order)  # quicker ones follow the speed
+    total += max(depth, 0.0) * (_SLOWEST * math.exp(-0.5 * step)) ** order / order  # slower ones the depth
+    for k in range(_MODES):
+        rate = _SLOWEST * math.exp(step * k)
+        kept = math.exp(-rate * dt)
+        state[4 + k] = state[4 + k] * kept + (went / dt * (1.0 - kept) / rate if dt > 0.0 else 0.0)
+        if depth <= 0.0:
+            state[4 + k] = 0.0
+        total += step * rate**order * state[4 + k]
+    whole = math.sin(math.pi * order) / math.pi * math.gamma(2.0 - order) * _EVEN_S ** (order - 1.0)
+    return float(p[0] * whole * total)
 
 
 @block
@@ -232,6 +259,17 @@ EFFECT = Effect(
             sought=False,
             blocks={"contact": plastic},
             state=_RESTING,
+        ),
+        Form(
+            name="springpot",
+            what="a fractional derivative, between dashpot and spring",
+            parameters=(
+                _coefficient("force per speed after 0.1 s of an even speed"),
+                Parameter("order", "1", 0.3, 0.98, 0.8, "of the derivative", starts=(0.6, 0.85)),
+            ),
+            sought=False,
+            blocks={"contact": springpot},
+            state=(0.0,) * (4 + _MODES),
         ),
         Form(
             name="one_sided",

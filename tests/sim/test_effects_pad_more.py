@@ -11,7 +11,7 @@ from sim.effects import effect
 from sim.elastic import Exponential
 from sim.pad import Pad
 from sim.relaxation import Relaxation
-from tests.sim.effect_tools import GEL, LINEAR, SOFT, K, active, ramp, simulate
+from tests.sim.effect_tools import AIR, GEL, LINEAR, SOFT, K, active, ramp, simulate
 
 
 class TestTheSpeedThatADashpotFeels:
@@ -195,3 +195,31 @@ class TestWhatTheNinthShowed:
         charge = np.array([*before[:5], again, again, again * math.exp(-1.0 / 8.0)])
         # At the range 1/e of what it is in contact.
         assert_allclose(force, -0.2 * charge**2 * np.where(x < 0.0, math.exp(-1.0), 1.0), rtol=1e-9)
+
+    def test_a_springpot_is_a_fractional_derivative(self) -> None:
+        """At an even speed v t^{1−α}/Γ(2−α), from 5 ms to 4 s; and stated is the force over speed after 0.1 s."""
+        t = np.linspace(0.0, 4.0, 8001)
+        for order in (0.5, 0.8, 0.95):
+            pot = active("viscous_damping", "springpot", coefficient=0.01, order=order)
+            soft = Pad(Exponential(1e-9, 0.0), Relaxation(), unilateral=True)
+            force = simulate(soft, [pot], t, 0.5 * t)
+            assert_allclose(force[10:], 0.01 * 0.5 * (t[10:] / 0.1) ** (1.0 - order), rtol=0.02)
+
+
+class TestWhatGoesOnByItself:
+    def test_a_part_that_friction_slows_down(self) -> None:
+        """Stopped from 10 mm/s, at 400 mm/s² it goes v²/2a = 125 µm; a play of 50 µm ends it before."""
+        t = 1e-3 * np.arange(400)
+        x = np.minimum(10.0 * t, 1.0)
+        for gap, ends in ((0.3, 1.125), (0.05, 1.05)):
+            coasts = active("backlash", "coasting", gap=gap, slows=400.0)
+            force = simulate(LINEAR, [coasts], t, x)
+            assert_allclose(force[:101], K * x[:101], atol=1e-9)
+            assert force[-1] == pytest.approx(K * ends, rel=1e-3)
+
+    def test_magnets_that_the_load_weakens(self) -> None:
+        x = ramp(2.0, 401)
+        wave = active("cogging", "weakening", amplitude=0.1, period=0.7, phase=0.3, lost=0.5, reach=2.0)
+        force = simulate(AIR, [wave], np.arange(x.size) * 0.01, x)
+        deepest = np.maximum.accumulate(x)
+        assert_allclose(force, 0.1 * (1.5 - 0.25 * deepest) * np.sin(2 * np.pi * x / 0.7 + 0.3), atol=1e-9)
