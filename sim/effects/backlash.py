@@ -129,7 +129,7 @@ def filled(dt: float, x: float, state: State, p: State) -> float:
 
 @block
 def coasting(dt: float, x: float, state: State, p: State) -> float:
-    """Probe side, from x to x + gap, pushed and then on by itself; p = (gap, slows). State: started, probe, x, speed."""
+    """Probe side, from x to x + gap, pushed and then on by itself; p = (gap, slows). State: …, probe, x, speed."""
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
         state[1] = state[2] = x

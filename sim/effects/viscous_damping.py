@@ -24,8 +24,8 @@ on it, and not at an end that none was seen at.
   rate (G. R. Johnson, W. H. Cook, Fracture characteristics of three metals, Eng. Fract. Mech. 21, 1985, 31–48).
 - `one_sided`: coefficient · (1 + differs · sgn v) v: more on the way in than on the way out, or less; `coefficient` is
   the mean of both.
-- `springpot`: a fractional derivative, C d^α δ/dt^α, between a dashpot and a spring, which sin(πα)/π ∫ ν^α w dln ν makes
-  of modes w' = v − ν w, three a decade; `coefficient` is force over speed after 0.1 s of an even speed (R. L. Bagley,
+- `springpot`: a fractional derivative, C d^α δ/dt^α, between a dashpot and a spring, made of sin(πα)/π ∫ ν^α w dln ν
+  by modes w' = v − ν w, three a decade; `coefficient` is force over speed after 0.1 s of an even speed (R. L. Bagley,
   P. J. Torvik, A theoretical basis for the application of fractional calculus to viscoelasticity, J. Rheol. 27, 1983,
   201–210).
 """
