@@ -263,7 +263,6 @@ EFFECT = Effect(
                 _GAP,
                 Parameter("slows", "mm/s²", 10.0, 1e4, 400.0, "by which friction slows it down", starts=(100.0, 500.0)),
             ),
-            sought=False,
             blocks={"play": coasting},
             state=(0.0,) * 4,
         ),
