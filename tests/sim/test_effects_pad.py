@@ -369,7 +369,8 @@ class TestViscousDamping:
         pad = replace(LINEAR, unilateral=unilateral)
         extra = simulate(pad, [active("viscous_damping", form, coefficient=0.05)], t, x) - simulate(pad, [], t, x)
         steps = extra[1:] * np.diff(x)
-        assert (steps > -1e-9).all()
+        # A springpot gives back some of what it takes: no more than that.
+        assert (steps > -1e-9).all() if form != "springpot" else (np.cumsum(steps) > -1e-9).all()
         assert steps[1000:].sum() > 1e-3
 
 
