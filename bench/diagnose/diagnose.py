@@ -100,8 +100,12 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
 
 def _pulsed(m: Measurement, flags: Faults) -> Faults:
     """With the pulses of a channel that has some in holds, where nothing else makes it rise at once and go back."""
-    pulsed = pulses(m.force_N, ~flags.by_itself)
-    return replace(flags, outlier=flags.outlier | pulsed) if (pulsed & resting(m)).sum() >= FEW else flags
+    return replace(flags, outlier=flags.outlier | _in_holds_too(m, pulses(m.force_N, ~flags.by_itself)))
+
+
+def _in_holds_too(m: Measurement, pulsed: Mask) -> Mask:
+    """Pulses of a channel that has some in holds; else none: in moves alone, the motion may have made them."""
+    return pulsed if (pulsed & resting(m)).sum() >= FEW else np.zeros_like(pulsed)
 
 
 def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple[list[Fit], list[float], list[float]]:
@@ -323,7 +327,7 @@ def _asked_again(
     known = np.isfinite(errors) & ~flags.by_itself
     outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect)
     outlier &= ~of_the_model(modelled, errors, outlier)
-    pulsed = pulses(np.where(np.isfinite(errors), errors, 0.0), known)
+    pulsed = _in_holds_too(m, pulses(np.where(np.isfinite(errors), errors, 0.0), known))
     outlier |= pulsed
     if outlier.sum() < FEW and not suspect.any():
         outlier &= resting(m)  # one or two in moves, in a channel without strays, are at the motion's corners
@@ -333,8 +337,7 @@ def _asked_again(
     few = STRAYS * len(holds(m.position_time_s, m.position_mm))
     if (flags.outlier.any() and further.sum() <= few) or strays(m, errors, further | unsure):
         rest &= ~further
-    if (pulsed & resting(m)).sum() >= FEW:  # a channel that has them in holds has them in moves
-        rest &= ~pulsed
+    rest &= ~pulsed
     near = (NEAR * prepared.floor_N) ** 2
     if not rest.any() or float(np.mean(errors[rest] ** 2)) > near:
         return prepared, flags, search, path  # against a wrong model transients look like outliers
