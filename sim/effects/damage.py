@@ -12,11 +12,14 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   counts more, and a stroke down to `reach` as much as elsewhere.
 - `threshold`: e^(−rate · travel/(1 − spared)) of the travel deeper than `spared` times `reach` alone: what stays above
   does no harm (Lemaitre's p_D). A stroke down to `reach` costs as much as elsewhere.
+- `fatigue`: as `power`, in the travel weighed as in `energy`: what a crack does whose growth goes with a power of the
+  stroke (Paris), the faster the longer it is (k below 0).
 
 `rate` is what a mm of travel takes at first, of the stiffness.
 
 Reference: J. Lemaitre, A Course on Damage Mechanics, 2nd ed., Springer, 1996
-(accumulated strain and energy as measures).
+(accumulated strain and energy as measures; chapter 4, fatigue); P. Paris and F. Erdogan, A critical analysis of crack
+propagation laws, J. Basic Eng. 85, 1963.
 """
 
 from __future__ import annotations
@@ -41,6 +44,29 @@ def loaded(depth: float, dead_band: float, last: float, travel: float) -> tuple[
     return min(last, here), travel
 
 
+@compiled("UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64)")
+def weighed(
+    depth: float, dead_band: float, last: float, travel: float, exponent: float, reach: float
+) -> tuple[float, float]:
+    """As `loaded`, with travel weighed by (exponent + 1) (depth/reach)^exponent."""
+    here = max(depth, 0.0)
+    gained = here - dead_band - last
+    if gained > 0.0:
+        n = exponent + 1.0
+        travel += reach * (((last + gained) / reach) ** n - (last / reach) ** n)
+        last += gained
+    return min(last, here), travel
+
+
+@compiled("float64(float64, float64)")
+def _by_power(lost: float, power: float) -> float:
+    """(1 + power · lost)^(−1/power), of which 0 is the exponential."""
+    if abs(power) < 1e-6:
+        return max(_LEAST, math.exp(-lost))
+    left = max(1.0 + power * lost, 1e-9)
+    return max(_LEAST, math.exp(-math.log(left) / power))
+
+
 @block
 def exponential(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, floor, dead_band)."""
@@ -52,11 +78,7 @@ def exponential(dt: float, depth: float, state: State, p: State) -> float:
 def power(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, power, dead_band)."""
     state[_LAST], state[_TRAVEL] = loaded(depth, p[2], state[_LAST], state[_TRAVEL])
-    lost = p[0] * state[_TRAVEL]
-    if abs(p[1]) < 1e-6:
-        return max(_LEAST, math.exp(-lost))
-    left = max(1.0 + p[1] * lost, 1e-9)
-    return max(_LEAST, math.exp(-math.log(left) / p[1]))
+    return _by_power(p[0] * state[_TRAVEL], p[1])
 
 
 @block
@@ -76,14 +98,15 @@ def linear(dt: float, depth: float, state: State, p: State) -> float:
 @block
 def energy(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, exponent, floor, reach, dead_band)."""
-    here = max(depth, 0.0)
-    gained = here - p[4] - state[_LAST]
-    if gained > 0.0:
-        n = p[1] + 1.0
-        state[_TRAVEL] += p[3] * (((state[_LAST] + gained) / p[3]) ** n - (state[_LAST] / p[3]) ** n)
-        state[_LAST] += gained
-    state[_LAST] = min(state[_LAST], here)
+    state[_LAST], state[_TRAVEL] = weighed(depth, p[4], state[_LAST], state[_TRAVEL], p[1], p[3])
     return p[2] + (1.0 - p[2]) * math.exp(-p[0] * state[_TRAVEL] / (1.0 - p[2]))
+
+
+@block
+def fatigue(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, exponent, power, reach, dead_band)."""
+    state[_LAST], state[_TRAVEL] = weighed(depth, p[4], state[_LAST], state[_TRAVEL], p[1], p[3])
+    return _by_power(p[0] * state[_TRAVEL], p[2])
 
 
 @block
@@ -107,6 +130,9 @@ _RATE = Parameter(
 )
 _FLOOR = Parameter("floor", "1", 0.0, 0.95, 0.0, "share of the stiffness that stays", starts=(0.0, 0.5))
 _DEAD_BAND = Parameter("dead_band", "mm", 0.0, 0.1, 0.004, "gain of depth that counts as noise", fixed=True)
+_POWER = Parameter("power", "1", -4.0, 12.0, 1.0, "0: exponential, 1: hyperbolic, -1: linear", starts=(-1.0, 1.0))
+_EXPONENT = Parameter("exponent", "1", 0.0, 5.0, 1.0, "power of depth that weights the travel", starts=(1.0, 2.0))
+_REACH = Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth of a stroke on which `rate` is the mean", fixed=True)
 
 EFFECT = Effect(
     id="damage",
@@ -141,27 +167,23 @@ EFFECT = Effect(
         Form(
             name="power",
             what="with a power of loading travel",
-            parameters=(
-                _RATE,
-                Parameter(
-                    "power", "1", -4.0, 12.0, 1.0, "0: exponential, 1: hyperbolic, -1: linear", starts=(-1.0, 1.0)
-                ),
-                _DEAD_BAND,
-            ),
+            parameters=(_RATE, _POWER, _DEAD_BAND),
             blocks={"elastic": power},
             state=(0.0, 0.0),
         ),
         Form(
             name="energy",
             what="exponentially with the work of loading",
-            parameters=(
-                _RATE,
-                Parameter("exponent", "1", 0.0, 5.0, 1.0, "power of depth that weights the travel", starts=(1.0, 2.0)),
-                _FLOOR,
-                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth of a stroke on which `rate` is the mean", fixed=True),
-                _DEAD_BAND,
-            ),
+            parameters=(_RATE, _EXPONENT, _FLOOR, _REACH, _DEAD_BAND),
             blocks={"elastic": energy},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="fatigue",
+            what="with a power of the work of loading, as a crack that grows",
+            parameters=(_RATE, _EXPONENT, _POWER, _REACH, _DEAD_BAND),
+            sought=False,
+            blocks={"elastic": fatigue},
             state=(0.0, 0.0),
         ),
         Form(
@@ -170,7 +192,7 @@ EFFECT = Effect(
             parameters=(
                 _RATE,
                 Parameter("spared", "1", 0.0, 0.9, 0.3, "limit over `reach`", starts=(0.2, 0.4, 0.6)),
-                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth of a stroke on which `rate` is the mean", fixed=True),
+                _REACH,
                 _DEAD_BAND,
             ),
             sought=False,

@@ -223,3 +223,14 @@ class TestWhatGoesOnByItself:
         force = simulate(AIR, [wave], np.arange(x.size) * 0.01, x)
         deepest = np.maximum.accumulate(x)
         assert_allclose(force, 0.1 * (1.5 - 0.25 * deepest) * np.sin(2 * np.pi * x / 0.7 + 0.3), atol=1e-9)
+
+
+def test_fatigue_goes_with_a_power_of_the_stroke_and_faster_the_weaker_the_pad_is() -> None:
+    """Of two strokes to 1 mm, one to half of it between: with the cube of the depth, and d(s²) constant in that."""
+    strokes = [ramp(1.0, 501), ramp(0.5, 501)[1:], ramp(1.0, 501)[1:]]
+    x = np.concatenate(strokes)
+    numbers = {"rate": 0.1, "exponent": 2.0, "power": -2.0, "reach": 1.0, "dead_band": 0.0}
+    force = simulate(LINEAR, [active("damage", "fatigue", **numbers)], np.arange(x.size) * 1e-3, x)
+    assert_allclose(force[500], K * math.sqrt(1 - 0.2), rtol=1e-9)
+    assert_allclose(force[1500], 0.5 * K * math.sqrt(1 - 0.2 * 1.125), rtol=1e-9)
+    assert_allclose(force[2500], K * math.sqrt(1 - 0.2 * 2.125), rtol=1e-9)
