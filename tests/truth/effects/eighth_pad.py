@@ -24,8 +24,8 @@ from numba import njit
 from scipy.optimize import brentq
 
 from ..laws import Law, _Tabulated
-from ..pad import Pad
 from .curves import stretched
+from .modes import add_modes, drawn_mode
 from .plant import simulate
 from .registry import Build, more_shapes, spread
 from .structure import hide_law
@@ -234,21 +234,13 @@ def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, 
 
     `havriliak_negami`: α of 0.75 to 0.9, β of 0.4 to 0.7. `two_materials`: the quicker has 0.4 to 0.6 of the share.
     """
-    rng, pad = build.rng, build.plant.pad
-    share = 0.08 * size * spread(rng, 0.7, 1.4)
-    known = np.log(pad.rates) if pad.rates else np.array([np.log(100.0)])
-    tries = rng.uniform(np.log(0.3), np.log(15.0), 12)
-    rate = float(np.exp(tries[np.argmax(np.min(np.abs(tries[:, None] - known), axis=1))]))
+    rng, (share, rate) = build.rng, drawn_mode(build, size, 0.3, 15.0)
     alpha, beta = float(rng.uniform(0.75, 0.9)), float(rng.uniform(0.4, 0.7))
     ratio, first = spread(rng, 10.0, 30.0), float(rng.uniform(0.4, 0.6))
     weights, rates = np.array([first, 1 - first]), rate * ratio ** np.array([0.5, -0.5])
     if shape == "havriliak_negami":
         weights, rates = havriliak_negami(rate, alpha, beta)
-    room = min(1.0, (0.85 - share) / max(sum(pad.shares), 1e-9))
-    shares = tuple(c * room for c in pad.shares)
-    added = tuple((share * weights).tolist())
-    build.plant.pad = Pad(pad.law, shares + added, pad.rates + tuple(rates.tolist()), pad.contact)
-    build.believed = replace(build.believed, shares=shares)
+    add_modes(build, share, weights, rates)
     return {"share": share, "rate": rate}
 
 

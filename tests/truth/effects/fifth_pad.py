@@ -22,8 +22,8 @@ from scipy.optimize import brentq
 from scipy.special import betainc
 
 from ..laws import Law, _Tabulated
-from ..pad import Pad
 from .curves import stretched
+from .modes import add_modes, drawn_mode
 from .outside_bench import _child
 from .registry import Build, more_shapes, spread
 from .structure import hide_law
@@ -191,18 +191,10 @@ def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, 
 
     `ending`: β of 0.45 to 0.65.
     """
-    rng, pad = build.rng, build.plant.pad
-    share = 0.08 * size * spread(rng, 0.7, 1.4)
-    known = np.log(pad.rates) if pad.rates else np.array([np.log(100.0)])
-    tries = rng.uniform(np.log(0.2), np.log(20.0), 12)
-    rate = float(np.exp(tries[np.argmax(np.min(np.abs(tries[:, None] - known), axis=1))]))
+    rng, (share, rate) = build.rng, drawn_mode(build, size, 0.2, 20.0)
     beads, power = int(rng.integers(4, 8)), float(rng.uniform(0.45, 0.65))
     weights, rates = rouse_rates(rate, beads) if shape == "rouse" else ending_rates(power, rate)
-    room = min(1.0, (0.85 - share) / max(sum(pad.shares), 1e-9))
-    shares = tuple(c * room for c in pad.shares)
-    added = tuple((share * weights).tolist())
-    build.plant.pad = Pad(pad.law, shares + added, pad.rates + tuple(rates.tolist()), pad.contact)
-    build.believed = replace(build.believed, shares=shares)
+    add_modes(build, share, weights, rates)
     return {"share": share, "rate": rate}
 
 

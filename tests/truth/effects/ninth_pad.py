@@ -33,8 +33,8 @@ from scipy.signal import lfilter
 from scipy.special import gamma, j0, j1, jn_zeros
 
 from ..laws import Law, _Tabulated
-from ..pad import Pad
 from .eighth_pad import _felt, _gap, _pad_alone, _unrelaxed
+from .modes import add_modes, drawn_mode
 from .outside_pad import _bonds
 from .registry import Build, more_shapes, spread
 from .structure import hide_law
@@ -288,18 +288,10 @@ def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, 
 
     `arm_retraction`: 1/e of it is left at 1/rate. `wet_disc`: Poisson's ratio 0 to 0.35; stated is the slowest rate.
     """
-    rng, pad = build.rng, build.plant.pad
-    share = 0.08 * size * spread(rng, 0.7, 1.4)
-    known = np.log(pad.rates) if pad.rates else np.array([np.log(100.0)])
-    tries = rng.uniform(np.log(0.3), np.log(15.0), 12)
-    rate = float(np.exp(tries[np.argmax(np.min(np.abs(tries[:, None] - known), axis=1))]))
+    rng, (share, rate) = build.rng, drawn_mode(build, size, 0.3, 15.0)
     barrier, poisson = float(rng.uniform(3.0, 5.0)), float(rng.uniform(0.0, 0.35))
     weights, rates = arm_rates(rate, barrier) if shape == "arm_retraction" else disc_rates(rate, poisson)
-    room = min(1.0, (0.85 - share) / max(sum(pad.shares), 1e-9))
-    shares = tuple(c * room for c in pad.shares)
-    added = tuple((share * weights).tolist())
-    build.plant.pad = Pad(pad.law, shares + added, pad.rates + tuple(rates.tolist()), pad.contact)
-    build.believed = replace(build.believed, shares=shares)
+    add_modes(build, share, weights, rates)
     return {"share": share, "rate": rate}
 
 

@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..laws import Law, _Tabulated
-from ..pad import Pad
 from .curves import stretched
+from .modes import add_modes
 from .registry import Build, more_shapes, spread
 from .structure import hide_law
 
@@ -93,15 +93,8 @@ def progressive(build: Build, shape: str, size: float) -> dict[str, float]:
 @more_shapes("missing_relaxation_mode", "box")
 def box(build: Build, shape: str, size: float) -> dict[str, float]:
     """Relaxation times spread evenly on a log scale over a decade and a half: modes of equal shares, four a decade."""
-    rng, pad = build.rng, build.plant.pad
-    share = 0.08 * size * spread(rng, 0.7, 1.4)
-    middle = spread(rng, 0.4, 15.0)
-    rates = middle * 10 ** np.linspace(0.75, -0.75, 7)
-    room = min(1.0, (0.85 - share) / max(sum(pad.shares), 1e-9))
-    shares = tuple(c * room for c in pad.shares)
-    added = (share / len(rates),) * len(rates)
-    build.plant.pad = Pad(pad.law, shares + added, pad.rates + tuple(rates.tolist()), pad.contact)
-    build.believed = replace(build.believed, shares=shares)
+    share, middle = 0.08 * size * spread(build.rng, 0.7, 1.4), spread(build.rng, 0.4, 15.0)
+    add_modes(build, share, np.full(7, 1 / 7), middle * 10 ** np.linspace(0.75, -0.75, 7))
     return {"share": share, "rate": middle}
 
 

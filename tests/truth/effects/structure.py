@@ -14,8 +14,8 @@ from scipy.optimize import least_squares, nnls
 
 from .. import draw
 from ..laws import Exponential, Law, Power, Tanh
-from ..pad import Pad
 from .curves import Blend, Foam, MooneyRivlin, TwoSlope
+from .modes import add_modes
 from .registry import Build, effect, spread
 
 
@@ -105,12 +105,7 @@ def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, 
         weights, rates = _stretched(float(rng.uniform(0.45, 0.65)), rate)
     elif shape == "pair":
         weights, rates = np.array([0.5, 0.5]), rate * np.array([1.7, 1 / 1.7])
-    # What is elastic for good stays at 0.15 at least; the known modes make room.
-    room = min(1.0, (0.85 - share) / max(sum(pad.shares), 1e-9))
-    shares = tuple(c * room for c in pad.shares)
-    added = tuple((share * weights).tolist())
-    build.plant.pad = Pad(pad.law, shares + added, pad.rates + tuple(rates.tolist()), pad.contact)
-    build.believed = replace(build.believed, shares=shares)
+    add_modes(build, share, weights, rates)
     return {"share": share, "rate": rate}
 
 

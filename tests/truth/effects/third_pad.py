@@ -8,15 +8,15 @@ distribution of rates; the fractional element (Koeller 1984), whose spectrum is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 from numba import njit
 
 from ..laws import Law, _Tabulated
-from ..pad import Pad
 from .curves import stretched
+from .modes import add_modes, drawn_mode
 from .registry import Build, more_shapes, spread
 from .structure import hide_law
 
@@ -155,20 +155,12 @@ def fractional_rates(alpha: float, rate: float) -> tuple[np.ndarray, np.ndarray]
 @more_shapes("missing_relaxation_mode", "power_tail", "fractional")
 def missing_relaxation_mode(build: Build, shape: str, size: float) -> dict[str, float]:
     """A power of time as a tail, t^{−1.5} to t^{−3}; or a fractional element, t^{−α} with α of 0.7 to 0.85."""
-    rng, pad = build.rng, build.plant.pad
-    share = 0.08 * size * spread(rng, 0.7, 1.4)
-    known = np.log(pad.rates) if pad.rates else np.array([np.log(100.0)])
-    tries = rng.uniform(np.log(0.3), np.log(20.0), 12)
-    rate = float(np.exp(tries[np.argmax(np.min(np.abs(tries[:, None] - known), axis=1))]))
+    rng, (share, rate) = build.rng, drawn_mode(build, size, 0.3, 20.0)
     if shape == "power_tail":
         weights, rates = gamma_rates(float(rng.uniform(1.5, 3.0)), rate)
     else:
         weights, rates = fractional_rates(float(rng.uniform(0.7, 0.85)), rate)
-    room = min(1.0, (0.85 - share) / max(sum(pad.shares), 1e-9))
-    shares = tuple(c * room for c in pad.shares)
-    added = tuple((share * weights).tolist())
-    build.plant.pad = Pad(pad.law, shares + added, pad.rates + tuple(rates.tolist()), pad.contact)
-    build.believed = replace(build.believed, shares=shares)
+    add_modes(build, share, weights, rates)
     return {"share": share, "rate": rate}
 
 
