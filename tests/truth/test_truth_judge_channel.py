@@ -5,7 +5,7 @@ import pytest
 from scipy.special import j0
 
 from .cases import draw_case
-from .effects.judge_channel import envelope, flipped, refused, torn
+from .effects.judge_channel import busy, envelope, flipped, torn
 from .effects.registry import SATURATION, Samples
 from .sets import shapes_of
 from .test_truth_effects import hidden
@@ -119,32 +119,43 @@ def test_a_radio_that_fades(seed):
     )
 
 
-def test_a_gate():
-    force = np.array([0.0, 0.4, 2.0, 2.1, 0.5, 2.2, 2.3, 2.4, 2.5, 2.6])
-    # From 0.4 on 2.0 and 2.1 are too far, 0.5 is not; of the rest three are refused and the fourth is taken.
-    assert list(np.flatnonzero(refused(force, 1.0, 3))) == [2, 3, 5, 6, 7]
-    assert not refused(force, 1.0, 0).any() and not refused(force, 2.6, 9).any()
+def test_who_comes_late_waits():
+    t = 0.01 * np.arange(100) + 0.005
+    # Asked at 0.1 for 0.1, at 0.15 for 0.2, at 0.38 for 0.1; at 0.7 for 0.1. The second waits, the third does so too.
+    at = busy(t, np.array([0.7, 0.1, 0.38, 0.15]), np.array([0.1, 0.1, 0.1, 0.2]))
+    assert np.array_equal(at, ((t > 0.1) & (t < 0.5)) | ((t > 0.7) & (t < 0.8)))
+
+
+def comb(times):
+    """What the times are apart, by ever more of them."""
+    apart = np.min(np.diff(times)[np.diff(times) > 0.3])
+    for n in (4, 10, 25, len(times)):
+        counts = np.round((times[:n] - times[0]) / apart)
+        apart = np.polyfit(counts, times[:n], 1)[0]
+    return apart
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_values_that_a_gate_refuses(seed):
-    case = draw_case(seed, ("stuck_samples",), 1.0, "gate", **MANY)
+def test_two_tasks_that_go_first(seed):
+    case = draw_case(seed, ("stuck_samples",), 2.0, "two_tasks", **MANY)
     truth, stuck = case.truth, case.truth.flags["stuck"]
-    where = np.flatnonzero(stuck)
+    where, t = np.flatnonzero(stuck), truth.force_true_time_s
     fraction = truth.parameters["stuck_samples"]["fraction"]
-    assert stuck.mean() == pytest.approx(fraction) and 0.0005 < fraction < 0.015
+    assert stuck.mean() == pytest.approx(fraction) and 0.0135 < fraction < 0.03
     assert np.array_equal(case.force_N[stuck], case.force_N[where - 1])
-    # What was refused is further from what is read than anything that came through is from the one before, unless it
-    # was the one after as many as it ever refuses.
-    was = case.force_N - truth.fault_N
     begins, lengths = runs(stuck)
-    most = lengths.max()
-    assert 1 <= most <= 15
-    gate = np.min(np.abs(truth.fault_N[stuck]))
-    through = np.flatnonzero(~stuck[1:]) + 1
-    after = through[np.isin(through, begins[lengths == most] + most)]
-    others = np.setdiff1d(through, after)
-    assert np.all(np.abs(was[others] - case.force_N[others - 1]) <= gate)
-    # In motion, and just after it where it was still held off.
-    moves = np.abs(truth.motion.velocity(truth.force_true_time_s)) > 0
-    assert np.mean(moves[begins]) > 0.9 and np.mean(moves) < 0.1
+    # Two combs make all that there is: each is as long as one of the tasks, or both in a row.
+    kinds = np.sort(lengths[1:-1])
+    short = int(np.median(kinds[kinds < 1.15 * kinds[len(kinds) // 4]]))
+    quick = t[begins[np.abs(lengths - short) <= 1]]
+    long = begins[(lengths > 1.2 * short) & (lengths < 2.05 * short)]
+    every, other = comb(quick), comb(t[long])
+    assert 0.599 <= every <= 1.201 and 1.29 <= other / every <= 1.91
+    step = np.median(np.diff(t))
+    assert short * step / every == pytest.approx(fraction / 2, rel=0.1)
+    assert np.median(lengths[np.isin(begins, long)]) * step / other == pytest.approx(fraction / 2, rel=0.1)
+    # Each at whole numbers of its own time, but for those few that had to wait.
+    for times, apart in ((quick, every), (t[long], other)):
+        count = (times - times[len(times) // 2]) / apart
+        assert np.mean(np.abs(count - np.round(count)) * apart < 4e-3) > 0.8
+        assert len(times) >= 0.8 * (t[-1] - t[0]) / apart - 2

@@ -5,9 +5,9 @@ Sources: D. Giannoulis, M. Massberg and J. D. Reiss, Digital dynamic range compr
 Commun. ACM 20 (1977) 806, of words that are read while they are written; J. Elliott, M. Hoemmen and F. Mueller,
 Exploiting data representation for fault tolerance, J. Comput. Sci. 14 (2016) 51, of bits that flip in floating numbers;
 R. H. Clarke, A statistical theory of mobile-radio reception, Bell Syst. Tech. J. 47 (1968) 957, and S. O. Rice,
-Statistical properties of a sine wave plus random noise, Bell Syst. Tech. J. 27 (1948) 109, of waves that fade; Y. Bar-
-Shalom and T. E. Fortmann, Tracking and Data Association (1988), of gates that refuse what is too far from the last
-value.
+Statistical properties of a sine wave plus random noise, Bell Syst. Tech. J. 27 (1948) 109, of waves that fade; C. L.
+Liu and J. W. Layland, Scheduling algorithms for multiprogramming in a hard-real-time environment, J. ACM 20 (1973) 46,
+of tasks that go first.
 """
 
 from __future__ import annotations
@@ -98,16 +98,14 @@ def outliers(build: Build, shape: str, size: float) -> dict[str, float]:
     return fraction
 
 
-@njit(cache=True)
-def refused(force_N, gate_N, most):
-    """What is further than the gate from the last value that came through, but for `most` in a row."""
-    out, last, row = np.zeros(force_N.shape[0], dtype=np.bool_), force_N[0], 0
-    for k in range(1, force_N.shape[0]):
-        if abs(force_N[k] - last) > gate_N and row < most:
-            out[k] = True
-            row += 1
-        else:
-            last, row = force_N[k], 0
+def busy(time_s: np.ndarray, asked_s: np.ndarray, takes_s: np.ndarray) -> np.ndarray:
+    """Whether a processor is at work for others, each of whom asks at some time and takes a while; the late wait."""
+    order = np.argsort(asked_s, kind="stable")
+    out, free_s = np.zeros(len(time_s), dtype=bool), -np.inf
+    for at, takes in zip(asked_s[order], takes_s[order], strict=True):
+        begins = max(at, free_s)
+        free_s = begins + takes
+        out[np.searchsorted(time_s, begins) : np.searchsorted(time_s, free_s)] = True
     return out
 
 
@@ -121,36 +119,36 @@ def envelope(time_s: np.ndarray, doppler_hz: float, rng: np.random.Generator, wa
     return np.abs(total) / np.sqrt(waves)
 
 
-@judge_shapes("stuck_samples", "fading", "gate")
+@judge_shapes("stuck_samples", "fading", "two_tasks")
 def stuck_samples(build: Build, shape: str, size: float) -> dict[str, float]:
-    """A radio whose waves fade as somebody walks about; or a gate that refuses what is too far from the last value.
+    """A radio whose waves fade as somebody walks about; or two tasks that go before the reader's, each at its own rate.
 
-    `fading`: nothing comes through while the envelope is below a level; 2 to 8 Hz at the most. `gate`: after 4 to 15
-    values that it has refused the next one is taken; what it lets through follows from the fraction.
+    `fading`: nothing comes through while the envelope is below a level; 2 to 8 Hz at the most. `two_tasks`: every 0.6
+    to 1.2 s, and 1.3 to 1.9 times that; each takes half of the fraction, and where both ask one waits for the other.
     """
     share, doppler = 0.01 * size * float(build.rng.uniform(0.7, 1.4)), float(build.rng.uniform(2.0, 8.0))
-    most, fraction = int(build.rng.integers(4, 16)), {"fraction": share}
+    period, ratio = float(build.rng.uniform(0.6, 1.2)), float(build.rng.uniform(1.3, 1.9))
+    late, fraction = build.rng.uniform(0, 1, 2), {"fraction": share}
 
     def stage(samples: Samples, rng: np.random.Generator) -> None:
-        force, n = samples.force_N, len(samples.force_N)
+        t, n = samples.time_s, len(samples.force_N)
         wanted = max(3, round(share * n))
         if shape == "fading":
-            faint = envelope(samples.time_s, doppler, rng)
+            faint = envelope(t, doppler, rng)
             faint[0] = np.inf
             stuck = faint <= np.partition(faint, wanted - 1)[wanted - 1]
         else:
-            # Above the noise, but where nothing is as quick.
-            low, high = 6 * samples.noise_std_N, float(np.ptp(force))
-            if np.count_nonzero(refused(force, low, most)) < 3:
-                low = 0.0
-            for _ in range(40):
-                gate = (low + high) / 2
-                low, high = (gate, high) if np.count_nonzero(refused(force, gate, most)) > wanted else (low, gate)
-            stuck = refused(force, high, most)
-            if not stuck.any():
-                stuck = refused(force, low, most)
+            periods = period * np.array([1.0, ratio])
+            asked = [np.arange(first, t[-1], every) for first, every in zip(late * periods, periods, strict=True)]
+            takes = np.concatenate([np.full(len(a), p / 2) for a, p in zip(asked, periods, strict=True)])
+            used, stuck = max(share, 3 / n), np.zeros(n, dtype=bool)
+            # Few samples are met by what is short.
+            while np.count_nonzero(stuck) < 3:
+                stuck = busy(t, np.concatenate(asked), used * takes)
+                stuck[0] = False
+                used *= 1.2
         # The last value that came in is read until the next one.
-        samples.force_N = force[np.maximum.accumulate(np.where(stuck, 0, np.arange(n)))]
+        samples.force_N = samples.force_N[np.maximum.accumulate(np.where(stuck, 0, np.arange(n)))]
         samples.flags["stuck"] = stuck
         fraction["fraction"] = float(np.mean(stuck))
 
