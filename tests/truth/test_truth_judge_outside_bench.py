@@ -48,12 +48,12 @@ def test_a_cell_of_pinned_walls(seed):
     up, down = out[:70_001], out[70_000:][::-1]
     # It goes up as it is pushed and never back, lies lower on the way up, and jumps.
     assert np.all(np.diff(up) >= 0) and np.all(np.diff(down) >= 0) and np.all(up <= down + 1e-9)
-    assert np.max(np.diff(up)) > 50 * np.median(np.diff(up)) and np.mean(down - up) > 0.3 * told["pinned"]
+    assert np.max(np.diff(up)) > 50 * np.median(np.diff(up)) and np.mean(down - up) > 0.15 * told["pinned"]
     assert 0.4 < np.std(up - UP_DOWN[:70_001]) / told["pinned"] < 1.8
-    # At rest nothing moves, and the second time is as the first from the same end.
-    assert np.ptp(through(build, np.full(50, 3.0))) == 0
-    twice = through(build, np.tile(UP_DOWN, 2))
-    assert np.allclose(twice[200_000:210_000], twice[60_000:70_000] if twice[140_000] == 0 else twice[200_000:210_000])
+    # At rest nothing moves, and the third time is as the second.
+    assert np.ptp(through(build, np.full(50, 3.0))) < 1e-9
+    again = through(build, np.tile(UP_DOWN[::10], 3)).reshape(3, -1)
+    assert np.allclose(again[2], again[1], atol=1e-9)
 
 
 def test_switches():
@@ -72,10 +72,10 @@ def test_a_cell_of_switches(seed):
     on = jumps < 70_000
     assert np.sum(on) == 16 and np.sum(~on) == 16 and off[0] == off[-1] == 0
     assert np.sum(sizes[on] > 0) == 8 and np.all((np.abs(sizes) > 0.249) & (np.abs(sizes) < 0.751))
-    assert np.all((where[on] >= 0.3 - 1e-3) & (where[on] <= 6.0 + 1e-3))
+    assert np.all((where[on] >= 0.6 - 1e-3) & (where[on] <= 6.0 + 1e-3))
     for size, at in zip(sizes[on], where[on], strict=True):
         back = where[~on][np.argmin(np.abs(sizes[~on] + size))]
-        assert 0.1 - 1e-3 <= (at - back) / 6 <= 0.4 + 1e-3 or back == pytest.approx(0.12, abs=1e-3)
+        assert 0.399 <= back / at <= 0.801
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -105,7 +105,9 @@ def test_a_drive_that_goes_by_a_curve(seed):
     assert 16e-3 <= every <= 25.1e-3 and np.allclose(stage(t, t**2)[middle], t[middle] ** 2, atol=1e-8)
     # Slopes from both sides are T² too much for t³: p (1 − p)(1 − 2 p) T³, √3/18 of that at the most.
     off = (stage(t, t**3) - t**3)[middle] / every**3
-    assert np.max(off) == pytest.approx(np.sqrt(3) / 18, rel=0.02) and np.min(off) == pytest.approx(-np.max(off))
+    assert np.max(off) == pytest.approx(np.sqrt(3) / 18, rel=0.02) and np.min(off) == pytest.approx(
+        -np.max(off), rel=1e-3
+    )
     # A corner is felt before it as well as after, by two of them.
     x = 60.0 * np.maximum(t - 0.2, 0.0)
     off = stage(t, x) - x

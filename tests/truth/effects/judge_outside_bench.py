@@ -71,8 +71,8 @@ def barkhausen(build: Build, shape: str, size: float) -> dict[str, float]:
     """A cell of magnetic steel, whose walls are pinned: the reading goes by jumps, at other forces up than down.
 
     `walls`: y + W(y) = F, W an Ornstein–Uhlenbeck process over 0.03 to 0.08 of the greatest force, and y goes no
-    further than it must. `switches`: 16 of either sign, on at 0.05 to 1 of the greatest force and off by 0.1 to 0.4 of
-    that lower, but above none.
+    further than it must. `switches`: 16, eight of either sign, on at 0.1 to 1 of the greatest force and off at 0.4 to
+    0.8 of that.
     """
     rng, child, most = build.rng, _child(build.rng), build.force_N
     pinned, over = 0.02 * size * most * spread(rng, 0.8, 1.25), most * spread(rng, 0.03, 0.08)
@@ -81,8 +81,8 @@ def barkhausen(build: Build, shape: str, size: float) -> dict[str, float]:
     along = _wandering(child, float(places[-1] - places[0]) / over, 1.0, 1 / 30)
     # Nothing where there is no force.
     ground = pinned * along((places - places[0]) / over) * -np.expm1(-np.abs(places) / over)
-    up = most * np.sort(child.uniform(0.05, 1.0, 16))
-    down = np.maximum(up - most * child.uniform(0.1, 0.4, 16), 0.02 * most)
+    up = most * child.uniform(0.1, 1.0, 16)
+    down = up * child.uniform(0.4, 0.8, 16)
     weights = child.permutation(np.resize([1.0, -1.0], 16)) * child.uniform(0.5, 1.5, 16)
 
     def stage(t, force):
