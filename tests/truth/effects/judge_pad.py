@@ -95,3 +95,103 @@ def elastic_law(build: Build, shape: str, size: float) -> dict[str, Any]:
     other: Law = ConicalCoil(1.0, narrow, base, travel) if shape == "conical_coil" else gel
     other = other.with_parameters({"modulus": build.force_N / float(other.force(depth))})
     return hide_law(build, shape, other, size)
+
+
+def amplified(now: np.ndarray, most: np.ndarray, power: float) -> np.ndarray:
+    """Depth d at which d (1 + d)^{−p} is now (1 + most)^{−p}: fresh rubber bears there what the worn one does now."""
+    wanted = now * (1 + most) ** -power
+    low, high = np.zeros_like(wanted), np.maximum(now, 0.0)
+    for _ in range(45):
+        middle = (low + high) / 2
+        above = middle * (1 + middle) ** -power > wanted
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return (low + high) / 2
+
+
+def bed_kept(part: np.ndarray, power: float) -> np.ndarray:
+    """What a bed of springs under a ball keeps at this part of its deepest point: 2 ∫ v (v x/(v x + 1 − x))^a dv.
+
+    Each spring keeps (u/m)^a of its force, u its depth and m its deepest one.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    v, w = (nodes[:, None] + 1) / 2, weights[:, None] / 2
+    x = np.clip(part, 1e-9, 1.0)
+    return np.sum(2 * w * v * (v * x / (v * x + 1 - x)) ** power, axis=0)
+
+
+@judge_shapes("stress_softening", "amplified_strain", "bed_of_fibres")
+def stress_softening(build: Build, shape: str, size: float) -> dict[str, float]:
+    """Hard parts raise the strain of the soft, by (1 + M/z)^{−p}, and go as it gets deeper; or each fibre forgets.
+
+    `amplified_strain`: z of 0.1 to 0.25 of the greatest depth; F is that of fresh rubber of the same inner strain.
+    `bed_of_fibres`: those at the rim of the touch were never pressed deep. Either loses the share at 2 `depth` below
+    the greatest depth, at 0.8 of it where that would lie in air; stated is what it loses, where p of 0.95 ends it.
+    """
+    rng, deepest, law = build.rng, build.depth_mm, build.plant.pad.law
+    share, depth = min(0.15 * size * spread(rng, 0.7, 1.4), 0.6), 0.5 * spread(rng, 0.6, 1.6)
+    there, part = max(1 - 2 * depth / deepest, 0.2), spread(rng, 0.1, 0.25)
+
+    def worn(power, now, most):
+        """What is kept at depths `now` of the deepest `most`, both in mm."""
+        if shape == "bed_of_fibres":
+            grid = np.linspace(0.0, 1.0, 801)
+            return np.interp(now / np.maximum(most, 1e-9), grid, bed_kept(grid, power))
+        fresh = part * deepest * amplified(now / part / deepest, most / part / deepest, power)
+        return np.where(now > 1e-6, law.force(fresh) / np.maximum(law.force(now), 1e-12), 1.0)
+
+    def loses(power):
+        return 1 - float(worn(power, np.array([there * deepest]), np.array([deepest]))[0])
+
+    most = 0.95 if shape == "amplified_strain" else 60.0
+    power = most if loses(most) < share else brentq(lambda p: loses(p) - share, 0.0, most)
+
+    def gain(t, x):
+        inner = np.maximum(x, 0.0)
+        return worn(power, inner, np.maximum.accumulate(inner))
+
+    build.plant.gain.append(gain)
+    return {"share": min(share, loses(power)), "depth": depth}
+
+
+@njit(cache=True)
+def _retarded(x, most, grows, power):
+    """Damage by the way in, slow as long as a crack runs in the zone that a deeper point left: (ρ/(A − a))^p.
+
+    ρ = (δ/most)² is the zone of the moment, A the far edge of the widest so far; a grows by `grows` in a full stroke.
+    """
+    out, a, edge, total = np.zeros(x.shape[0]), 0.0, 0.0, 0.0
+    for k in range(1, x.shape[0]):
+        way = max(x[k], 0.0) - max(x[k - 1], 0.0)
+        if way > 0:
+            zone = (x[k] / most) ** 2
+            edge = max(edge, a + zone)
+            slow = (zone / (edge - a)) ** power
+            total += slow * way
+            a += grows * slow * way / most
+        out[k] = total
+    return out
+
+
+@judge_shapes("damage", "under_load", "overloads")
+def damage(build: Build, shape: str, size: float) -> dict[str, float]:
+    """Bonds break by heat, at a rate of e^{F/F_0} − 1, at rest too; or a deep stroke slows what shallower ones do.
+
+    `under_load`: F the elastic force, F_0 of 0.2 to 0.4 of the greatest. `overloads`: p of 1 to 1.5; the crack grows by
+    0.1 to 0.3 of the widest zone in a full stroke. Of both r is the mean over all of the way of loading.
+    """
+    rng, rate, deepest = build.rng, 0.01 * size * spread(build.rng, 0.6, 1.6), build.depth_mm
+    barrier, law = build.force_N * spread(rng, 0.2, 0.4), build.plant.pad.law
+    grows, power = spread(rng, 0.1, 0.3), float(rng.uniform(1.0, 1.5))
+
+    def gain(t, x):
+        inner = np.maximum(x, 0.0)
+        if shape == "under_load":
+            # No more than e^12: nothing lives longer than that, however deep it is pressed.
+            whole = np.cumsum(np.expm1(np.minimum(law.force(inner) / barrier, 12.0)))
+        else:
+            whole = _retarded(inner, deepest, grows, power)
+        way = np.sum(np.maximum(np.diff(inner), 0.0))
+        return np.exp(-rate * way * whole / max(whole[-1], 1e-12))
+
+    build.plant.gain.append(gain)
+    return {"rate": rate}
