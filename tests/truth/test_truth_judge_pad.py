@@ -156,3 +156,31 @@ def test_overloads(seed):
     # 5 mm in all, of which the first two cost the most by the mm, and the shallow one the least.
     assert last == pytest.approx(5 * told["rate"], rel=0.01)
     assert first / 2 > 1.4 * told["rate"] and 0 < small - first < 0.35 * (last - small) and last - small < 0.7 * first
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_surface_that_wears(seed):
+    motion = Path(0.0, np.inf).to(2.0, 20.0).hold(0.5).to(-0.5, 20.0).to(1.0, 5.0).to(0.5, 20.0).hold(0.1).motion()
+    fine, told, _ = hidden("permanent_set", "wears", motion=motion, seed=seed)
+    x, t = fine.reported_mm, fine.time_s
+    sunk = (x - fine.force_N / 3) / told["set"]
+    # Work of 3 N/mm: 6 N mm in and out again, 1.5 N mm for the later millimetre, and 1.125 N mm half the way back.
+    whole = 6 + 6 + 1.5 + 1.125
+    for at, work in ((0.05, 1.5), (0.59, 6.0), (0.65, 6 + 4.5), (0.925, 12.375), (1.025, 13.5), (1.1, whole)):
+        assert np.interp(at, t, sunk) == pytest.approx(2 * work / whole, abs=5e-3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_pad_that_crystallizes(seed):
+    motion = Path(0.0, np.inf).to(2.0, 1e4).hold(2.0).to(-0.5, 1e4).hold(1.0).to(1.0, 1e4).hold(4.0).motion()
+    fine, told, _ = hidden("permanent_set", "crystallizes", motion=motion, seed=seed)
+    sunk = (fine.reported_mm - fine.force_N / 3) / told["set"] / 2.0
+    # 8 mm s in all, half of it in each of the two presses; which n and τ from two points, and the others of these.
+    orders, parts = np.meshgrid(np.linspace(2.0, 3.0, 201), np.linspace(0.3, 0.6, 201))
+    times, loads = np.array([0.5, 1.0, 1.5, 4.0, 5.0, 6.0]), np.array([1.0, 2.0, 3.0, 5.0, 6.0, 7.0]) / 8
+    made = np.interp(times, fine.time_s, sunk)
+    wanted = np.expm1(-((loads[:, None, None] / parts) ** orders)) / np.expm1(-((1 / parts) ** orders))
+    assert np.min(np.max(np.abs(wanted - made[:, None, None]), axis=0)) < 5e-3
+    # Late at first; nothing more in air; all of it in the end.
+    assert 3 < made[1] / made[0] < 8.1 and sunk[-1] == pytest.approx(1.0, abs=1e-3)
+    assert np.interp(3.002, fine.time_s, sunk) == pytest.approx(np.interp(1.999, fine.time_s, sunk), abs=2e-3)

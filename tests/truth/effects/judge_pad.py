@@ -195,3 +195,26 @@ def damage(build: Build, shape: str, size: float) -> dict[str, float]:
 
     build.plant.gain.append(gain)
     return {"rate": rate}
+
+
+@judge_shapes("permanent_set", "wears", "crystallizes")
+def permanent_set(build: Build, shape: str, size: float) -> dict[str, float]:
+    """The surface is worn off by force times way, in and out; or the pad hardens in its pressed shape, late at first.
+
+    `wears`: it bulges and rubs along the probe. `crystallizes`: 1 − e^{−(K/τ)^n}, K the time under load, which counts
+    by the depth, τ of 0.3 to 0.6 of all of it, n of 2 to 3. Stated is s of the greatest depth at the recording's end.
+    """
+    rng, rate = build.rng, min(0.03 * size * spread(build.rng, 0.7, 1.4), 0.3)
+    part, order, law = float(rng.uniform(0.3, 0.6)), float(rng.uniform(2.0, 3.0)), build.plant.pad.law
+
+    def height(t, x):
+        inner = np.maximum(x, 0.0)
+        if shape == "wears":
+            whole = np.cumsum(law.force(inner) * np.abs(np.diff(inner, prepend=inner[0])))
+        else:
+            loaded = np.cumsum(inner)
+            whole = -np.expm1(-((loaded / max(part * loaded[-1], 1e-12)) ** order))
+        return rate * build.depth_mm * whole / max(whole[-1], 1e-12)
+
+    build.plant.height.append(height)
+    return {"set": rate}
