@@ -41,7 +41,8 @@ def test_a_plan_has_every_id_and_every_shape():
 
 
 @pytest.mark.skipif(
-    not all(EFFECTS[id].judge for id in CATALOGUE), reason="a new judge half is being written: of some ids there is none"
+    not all(EFFECTS[id].judge for id in CATALOGUE),
+    reason="a new judge half is being written: of some ids there is none",
 )
 def test_the_judge_half_has_cases_of_its_own():
     counts = (2, 1, 6, 8, 30)

@@ -31,7 +31,8 @@ TOUCHED += [(*pair, contact) for pair in BEYOND if pair[1] in EFFECTS[pair[0]].j
 
 
 @pytest.mark.skipif(
-    not all(EFFECTS[id].judge for id in CATALOGUE), reason="a new judge half is being written: of some ids there is none"
+    not all(EFFECTS[id].judge for id in CATALOGUE),
+    reason="a new judge half is being written: of some ids there is none",
 )
 def test_the_judge_keeps_to_itself():
     least = {"third": 8, "fourth": 10, "fifth": 10, "sixth": 10, "seventh": 10, "eighth": 10, "ninth": 10, "judge": 10}
