@@ -30,8 +30,8 @@ from bench.felt_motion import felt
 from bench.identify.problem import sized
 from bench.recording.types import Measurement
 from bench.restamp import restamped
+from sim.grid import union
 from sim.model import Model
-from sim.pad import union
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

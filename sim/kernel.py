@@ -355,11 +355,35 @@ def plant_step(program: Ints, params: Doubles, state: Doubles, dt: float, x: flo
     return float(state[CELL])
 
 
-@compiled("void(int64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
-def run(program: Program, params: Array, state: Array, dt: Array, x: Array, force: Array, probe: Array) -> None:
-    """`plant_step` over arrays of shape (n,): force at the cell and probe position are written to the last two."""
+@compiled("void(float64, float64[::1], float64[::1], float64[::1])")
+def fade(rate: float, dt: Array, decay: Array, gain: Array) -> None:
+    """What `pad_step` works out for one mode in steps dt (n,): decay e^(−ν dt) and gain φ(ν dt), into the last two."""
+    for n in range(dt.size):
+        x = rate * dt[n]
+        gain[n] = ramp_gain(x)
+        decay[n] = 1.0 - x * gain[n]
+
+
+@compiled(
+    "void(int64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1],"
+    " float64[:, ::1], float64[:, ::1])"
+)
+def run(
+    program: Program, params: Array, state: Array, dt: Array, x: Array, force: Array, probe: Array, decay: Array,
+    gain: Array,
+) -> None:  # fmt: skip
+    """`plant_step` over arrays of shape (n,): force at the cell and probe position are written to `force` and `probe`.
+
+    `decay`, `gain` (r, n): of each mode and step as `fade` has them, or (0, n) to have them worked out here.
+    """
     program_p, params_p, state_p = pointer(program), pointer(params), pointer(state)
+    r, cache = decay.shape[0], program[CACHE]
     for n in range(x.size):
+        if r > 0:
+            state[cache] = dt[n]
+            for i in range(r):
+                state[cache + 1 + i] = decay[i, n]
+                state[cache + 1 + r + i] = gain[i, n]
         force[n] = plant_step(program_p, params_p, state_p, dt[n], x[n])
         probe[n] = state[Y]
 
@@ -386,13 +410,16 @@ def run_chain(program: Program, params: Array, state: Array, place: int, dt: Arr
 
 @compiled("void(int64[::1], float64[::1], float64[::1], float64[::1])")
 def unreport(program: Program, params: Array, state: Array, u: Array) -> None:
-    """True positions from reported ones, in place, by bracketed secant steps; `report` blocks are static and rise."""
+    """True positions from reported ones, in place, by bracketed secant steps; `report` blocks are static and rise.
+
+    Each begins with the error and the slope of the one before: positions stand still most of the time.
+    """
     program_p, params_p, state_p = pointer(program), pointer(params), pointer(state)
+    off, slope = 0.0, 1.0
     for n in range(u.size):
-        y = u[n]
+        y = u[n] + off
         low, high = -math.inf, math.inf
         before, error_before = y, 0.0
-        slope = 1.0
         for k in range(60):
             error = chain(program_p, params_p, state_p, 0, REPORT, 0.0, y) - u[n]
             if abs(error) <= 1e-15 * max(abs(y), 0.1):
@@ -412,6 +439,7 @@ def unreport(program: Program, params: Array, state: Array, u: Array) -> None:
                     y = 0.5 * (low + high)
                     if not low < y < high:  # nothing lies between
                         break
+        off = y - u[n]
         u[n] = y
 
 

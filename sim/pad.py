@@ -16,13 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from sim import kernel as k
 from sim.effects.base import Active
 from sim.elastic import ElasticLaw
+from sim.grid import Grid, check_times, checked, of_one_length, steps, union
 from sim.program import Layout, lay_out
 from sim.relaxation import Relaxation
 
 Array = NDArray[np.float64]
-
-SAME_INSTANT_S = 1e-9
-"""Stamps closer than this are one instant: differences over less are rounding."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +77,14 @@ class Cascade:
         """
         if self.shifts_time:
             return self.simulate_at(time_s, position_mm, time_s)
-        time, position = checked(time_s, position_mm)
-        force, _ = self._grid(time, self._true(position))
-        return self._sampled(time, force)
+        return self.simulate_on(Grid(time_s), position_mm)
+
+    def simulate_on(self, grid: Grid, position_mm: ArrayLike) -> Array:
+        """As `simulate`, for times that are checked already: a fit runs over the same ones again and again."""
+        if self.shifts_time:
+            return self.simulate_at(grid.time_s, position_mm, grid.time_s)
+        force, _ = self._run(grid, self._true(of_one_length(grid.time_s, position_mm)))
+        return self._sampled(grid.dt_s, force)
 
     def simulate_at(self, position_time_s: ArrayLike, position_mm: ArrayLike, force_time_s: ArrayLike) -> Array:
         """Force as reported at force times (m,), for positions (n,) at their own times, linear between them.
@@ -97,17 +100,14 @@ class Cascade:
         last = np.append(np.diff(time) > 0.0, True)
         time, position = time[last], self._true(position[last])
         felt = k.as_vector(self.felt_at(force_time))
-        grid, index = union(time, felt)
-        force, _ = self._grid(grid, np.interp(grid, time, position))
-        return self._sampled(force_time, force[index])
+        every, index = union(time, felt)
+        force, _ = self._run(Grid(every), np.interp(every, time, position))
+        return self._sampled(steps(force_time), force[index])
 
     def probe(self, time_s: ArrayLike, position_mm: ArrayLike) -> tuple[Array, Array]:
         """(force at the cell, N; probe position, mm), both (n,), before the force path; else as `simulate`."""
-        time, position = checked(time_s, position_mm)
-        layout = self.layout
-        force, probe = np.empty(time.size), np.empty(time.size)
-        k.run(layout.program, layout.parameters, layout.state.copy(), steps(time), self._true(position), force, probe)
-        return force, probe
+        grid = Grid(time_s)
+        return self._run(grid, self._true(of_one_length(grid.time_s, position_mm)), felt_by_cell=True)
 
     def _true(self, reported: Array) -> Array:
         """True positions from reported ones."""
@@ -116,23 +116,24 @@ class Cascade:
             k.unreport(self.layout.program, self.layout.parameters, self.layout.state.copy(), true)
         return true
 
-    def _grid(self, time: Array, position: Array) -> tuple[Array, Array]:
-        """Force after the sensor's dynamics, and the probe, for true positions."""
+    def _run(self, grid: Grid, position: Array, felt_by_cell: bool = False) -> tuple[Array, Array]:
+        """(force after the sensor's dynamics, or as the cell feels it; the probe), for true positions."""
         layout = self.layout
         state = layout.state.copy()
-        dt = steps(time)
-        force, probe = np.empty(time.size), np.empty(time.size)
-        k.run(layout.program, layout.parameters, state, dt, position, force, probe)
-        if layout.has("sensor"):
-            k.run_chain(layout.program, layout.parameters, state, k.SENSOR, dt, force)
+        force, probe = np.empty(position.size), np.empty(position.size)
+        # where a block changes the rates they are worked out step by step
+        decay, gain = grid.fades(() if layout.has("rate") else self.pad.relaxation.rates)
+        k.run(layout.program, layout.parameters, state, grid.dt_s, position, force, probe, decay, gain)
+        if layout.has("sensor") and not felt_by_cell:
+            k.run_chain(layout.program, layout.parameters, state, k.SENSOR, grid.dt_s, force)
         return force, probe
 
-    def _sampled(self, time: Array, force: Array) -> Array:
-        """What sampling makes of a force at its sample times."""
+    def _sampled(self, dt: Array, force: Array) -> Array:
+        """What sampling makes of a force at its samples, `dt` apart."""
         layout = self.layout
         if layout.has("sampling"):
             force = k.as_vector(force)
-            k.run_chain(layout.program, layout.parameters, layout.state.copy(), k.SAMPLING, steps(time), force)
+            k.run_chain(layout.program, layout.parameters, layout.state.copy(), k.SAMPLING, dt, force)
         return force
 
 
@@ -206,52 +207,3 @@ class Plant:
         twin = type(self)(self._layout)
         twin.state[:] = self.state
         return twin
-
-
-def checked(time_s: ArrayLike, position_mm: ArrayLike) -> tuple[Array, Array]:
-    """Both as vectors of one length; ValueError where they are not, are not finite, or time falls."""
-    time, position = k.as_vector(time_s), k.as_vector(position_mm)
-    if time.ndim != 1 or time.shape != position.shape:
-        raise ValueError(f"time and position differ in shape: {time.shape} and {position.shape}")
-    check_times(time, "position")
-    if not np.isfinite(position).all():
-        raise ValueError("a position is not a finite number")
-    return time, position
-
-
-def check_times(time: Array, channel: str) -> None:
-    """ValueError where times are not finite or fall."""
-    if not np.isfinite(time).all():
-        raise ValueError(f"a {channel} time is not a finite number")
-    falls = np.flatnonzero(np.diff(time) < 0.0)
-    if falls.size:
-        raise ValueError(f"{channel} time falls at sample {falls[0] + 1}, {time[falls[0] + 1]:g} s")
-
-
-def steps(time: Array) -> Array:
-    """Time from each sample to the next, starting with 0; shape (n,)."""
-    return np.diff(time, prepend=time[:1])
-
-
-def union(first: Array, second: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Both rising grids as one without near duplicates, and where each element of `second` is in it.
-
-    Where stamps of the two fall within a nanosecond the one from `first` stands.
-    """
-    if np.array_equal(first, second):
-        return first, np.arange(first.size)
-    after = np.searchsorted(first, second)
-    low, high = np.maximum(after - 1, 0), np.minimum(after, first.size - 1)
-    near = np.where(np.abs(first[low] - second) <= np.abs(first[high] - second), low, high)
-    same = np.abs(first[near] - second) <= SAME_INSTANT_S
-    snapped = np.where(same, first[near], second)
-    fresh = snapped[~same]
-    if fresh.size:
-        fresh = fresh[np.append(True, np.diff(fresh) > SAME_INSTANT_S)]
-    grid = np.sort(np.concatenate([first, fresh]), kind="stable")
-    index = np.searchsorted(grid, snapped)
-    # a stamp of `second` that was dropped for its close neighbour takes the neighbour's place
-    index = np.minimum(index, grid.size - 1)
-    before = np.maximum(index - 1, 0)
-    closer = np.abs(grid[before] - snapped) < np.abs(grid[index] - snapped)
-    return grid, np.where(closer, before, index)

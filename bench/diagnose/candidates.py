@@ -6,7 +6,7 @@ residual; it is only a start: a candidate is judged by a joint refit.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 CHANNEL = ("outliers", "stuck_samples", "mains_hum")  # found by detectors, not by fitting
 MOST_STARTS = 96
 LOWEST_RINGING_HZ, FREQUENCIES = 4.0, 32
+NEARBY, ABOUT = 7, 2.0  # frequencies about one that was found, and up to how many times it, either way
 SHORTEST = 0.12  # of the longest period
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
@@ -262,23 +263,29 @@ def combinations(form: Form) -> Iterator[dict[str, float]]:
         yield dict(zip([p.name for p in shapes], values, strict=True))
 
 
-def _scanned(form: Form) -> Iterator[dict[str, float]]:
+def _scanned(form: Form, near: Mapping[str, float]) -> Iterator[dict[str, float]]:
     """Values to start from where nothing scales the effect; frequencies densely, since ringing has narrow minima."""
     frequency = next((p for p in form.parameters if p.unit == "Hz"), None)
     if frequency is None:
         yield from combinations(form)
         return
-    least = max(frequency.lower, LOWEST_RINGING_HZ)
-    if least >= frequency.upper:  # so slow are the data
+    least, most, count = max(frequency.lower, LOWEST_RINGING_HZ), frequency.upper, FREQUENCIES
+    if least >= most:  # so slow are the data
         least = frequency.lower
+    if frequency.name in near:
+        found, count = near[frequency.name], NEARBY
+        least, most = max(found / ABOUT, frequency.lower), min(found * ABOUT, frequency.upper)
     others = replace(form, parameters=tuple(p for p in form.parameters if p is not frequency))
     for values in combinations(others):
-        for f in np.geomspace(least, frequency.upper, FREQUENCIES):
+        for f in np.geomspace(least, most, count):
             yield {**values, frequency.name: float(f)}
 
 
-def starts(signatures: Signatures, effect: Effect, form: Form, most: int = 2) -> list[Start]:
-    """The most promising starts of a form, best first."""
+def starts(
+    signatures: Signatures, effect: Effect, form: Form, most: int = 2, near: Mapping[str, float] | None = None
+) -> list[Start]:
+    """The most promising starts of a form, best first. `near`: numbers of another form of the family that was found,
+    about which frequencies are sought."""
     cause = cause_of(effect, form)
     if form.amend is not None and cause.amplitude is None:
         amended = _amended(signatures.fit, cause)
@@ -286,7 +293,7 @@ def starts(signatures: Signatures, effect: Effect, form: Form, most: int = 2) ->
             amended = sorted(amended, key=lambda c: -signatures.whole(c))
         return [Start(c, np.inf) for c in amended[:most]]
     if cause.amplitude is None:
-        tried = [cause.with_start(**values) for values in _scanned(form)]
+        tried = [cause.with_start(**values) for values in _scanned(form, near or {})]
         if len(tried) > most:
             tried = sorted(tried, key=lambda c: -signatures.whole(c))
         return [Start(c, np.inf) for c in tried[:most]]

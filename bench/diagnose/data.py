@@ -14,8 +14,8 @@ from bench.identify.noise import stiffness_along
 from bench.identify.problem import sized, touches
 from bench.recording.types import Measurement
 from bench.restamp import restamped
+from sim.grid import Grid, union
 from sim.jit import compiled
-from sim.pad import union
 
 from .hum import Line, find
 from .noise import Colour, ForceNoise, force_noise, hold_errors
@@ -61,6 +61,11 @@ class Data:
     def total_N(self) -> Array:
         """Standard deviation of one force sample, all in all (n,)."""
         return self.sigma_N if self.shared_N is None else np.asarray(np.hypot(self.sigma_N, self.shared_N))
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The stamps, as simulations take them."""
+        return Grid(self.time_s)
 
     @cached_property
     def scale(self) -> Array:

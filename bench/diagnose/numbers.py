@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +61,7 @@ class PadNumbers:
     depth_mm: float
     force_N: float
 
-    @property
+    @cached_property
     def coordinates(self) -> list[Coordinate]:
         """The law's numbers, then e_1 … e_r, then the rates."""
         r = self.pad.relaxation.order
@@ -177,12 +178,12 @@ class Structure:
             found.append(Coordinate("zero", -4.0, 4.0, unit=self.zero_N))
         object.__setattr__(self, "coordinates", tuple(found))
 
-    @property
+    @cached_property
     def lower(self) -> Array:
         """Lower bounds of x."""
         return np.array([c.lower for c in self.coordinates])
 
-    @property
+    @cached_property
     def upper(self) -> Array:
         """Upper bounds of x."""
         return np.array([c.upper for c in self.coordinates])

@@ -64,7 +64,7 @@ def force_at(data: Data, structure: Structure, x: Array) -> Array:
     """Simulated force on the grid (n,), N; not finite where the numbers make no plant."""
     position = data.position_mm + structure.surface_mm(x)
     with np.errstate(all="ignore"):
-        force = structure.cascade(x).simulate(data.time_s, position)
+        force = structure.cascade(x).simulate_on(data.grid, position)
     # the tare takes the pad's own force at that time off, and leaves its own error, which is the offset
     zero_N = 0.0 if data.tared is None else float(np.mean(force[data.tared]))
     return np.asarray(force - zero_N + structure.offset_N(x))

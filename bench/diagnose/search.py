@@ -301,12 +301,12 @@ class Search(Sieve):
                 continue
             structure, x = reduced(now, index)
             here, without = replace(now, structure=structure, x=x), self._without(now, index)
-            signatures = Signatures(self.short, without)
+            signatures, numbers = Signatures(self.short, without), now.structure.values(now.x)[index]
             for effect, form in forms(structure, structure.in_air, self.reach, also_unsought=True):
                 if effect.id != cause.id or form.name == cause.form.name:
                     continue
                 begun.append((here, alike(now, index, cause_of(effect, form))))
-                begun += [(without, s.cause) for s in starts(signatures, effect, form)]
+                begun += [(without, s.cause) for s in starts(signatures, effect, form, near=numbers)]
         with ThreadPoolExecutor(WORKERS) as pool:
             first = [
                 t for t in pool.map(lambda start: self._joined(start[0], start[1], FEW, None), begun) if t is not None

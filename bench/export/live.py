@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bench.export.realtime import real_time_pad
+from sim.grid import checked, steps
 from sim.kernel import ramp_gain
 from sim.model import Model
-from sim.pad import checked, steps
 
 Array = NDArray[np.float64]
 

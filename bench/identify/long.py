@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.recording.types import Measurement
-from sim.pad import union
+from sim.grid import union
 
 from ._kernel import Array
 from .motion import LONG

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bench.errors import InputError
 from bench.motion_between import motion_between
 from bench.recording.types import Measurement
-from sim.pad import union
+from sim.grid import union
 
 from ._kernel import Array
 from .long import is_long, shortened

@@ -9,6 +9,7 @@ import numpy as np
 
 from sim import kernel as k
 from sim.axis import BenchPlant, ServoSettings
+from sim.grid import Grid
 from sim.model import Model
 from sim.relaxation import modes, modes_and_slopes
 from tests.benchmarks.report import Goal, Section, Table, middle
@@ -52,7 +53,8 @@ def _plant(effects: Sequence[Mapping[str, object]], samples: int = 100_000) -> t
     layout = model.cascade.layout
     force, probe = np.empty(samples), np.empty(samples)
     state = layout.state.copy()
-    array = rounds(lambda: k.run(layout.program, layout.parameters, state, dt, x, force, probe))
+    fades = Grid(t).fades(model.cascade.pad.relaxation.rates)
+    array = rounds(lambda: k.run(layout.program, layout.parameters, state, dt, x, force, probe, *fades))
     plant = model.plant()
     steps = x[:20_000].tolist()
 

@@ -6,7 +6,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sim.elastic import Exponential, NoPad, Polynomial, Power
-from sim.pad import Cascade, Pad, union
+from sim.grid import union
+from sim.pad import Cascade, Pad
 from sim.relaxation import Relaxation
 
 GEL = Relaxation((0.25, 0.15), (4.0, 0.35))

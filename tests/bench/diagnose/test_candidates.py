@@ -24,11 +24,15 @@ def test_ringing_is_sought_at_all_frequencies_that_the_data_can_show(form, rate_
     """Down to data so slow that no usual start lies within what they show."""
     reach = Reach(sample_s=1 / rate_Hz, span_s=60.0, travel_mm=3.0, depth_mm=2.5, force_N=5.0, changes_N=60.0)
     shape = narrowed(effect("resonance").form(form), reach)
-    starts = list(_scanned(shape))
+    starts = list(_scanned(shape, {}))
     found = np.unique([values["frequency"] for values in starts])
     assert 0 < found[0] <= max(4.0, 0.1 * rate_Hz) and found[-1] == pytest.approx(0.9 * rate_Hz)
     assert len({values["damping_ratio"] for values in starts}) > 1
     assert all(len(values) == len(starts[0]) for values in starts)
+    near = 0.2 * rate_Hz  # where the family's other form was found
+    beside = {values["frequency"] for values in _scanned(shape, {"frequency": near})}
+    assert len(beside) < len(found) and min(beside) < 0.6 * near and max(beside) > 1.7 * near
+    assert min(abs(np.log(f / near)) for f in beside) < 0.01
 
 
 @pytest.mark.parametrize("id_", LATE)

@@ -1,0 +1,34 @@
+"""Times of a simulation: what is kept for speed is right, and goes when it is sent."""
+
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from sim.grid import Grid
+
+
+def test_what_a_mode_keeps_and_gains_in_each_step():
+    time = np.cumsum(np.random.default_rng(1).choice([0.0, 1e-4, 0.02, 3.0], 500))
+    grid, rates = Grid(time), (40.0, 0.3)
+    decay, gain = grid.fades(rates)
+    x = np.outer(rates, np.diff(time, prepend=time[0]))
+    assert_allclose(decay, np.exp(-x), rtol=1e-12, atol=1e-15)
+    where = x > 0
+    assert_allclose(gain[where], (1 - np.exp(-x[where])) / x[where], rtol=1e-10)
+    assert np.all(gain[~where] == 1.0)
+    again, _ = grid.fades((0.3,))  # a mode of a set that was asked for before
+    assert np.array_equal(again[0], decay[1])
+    assert grid.fades(())[0].shape == (0, 500)
+
+
+def test_a_grid_that_is_sent_is_the_same():
+    grid = pickle.loads(pickle.dumps(Grid([0.0, 0.1, 0.4])))
+    assert_allclose(grid.dt_s, [0.0, 0.1, 0.3])
+
+
+@pytest.mark.parametrize("bad", [[0.0, -1.0], [0.0, np.nan]])
+def test_times_that_fall_or_are_not_finite_are_refused(bad):
+    with pytest.raises(ValueError, match="time"):
+        Grid(bad)
