@@ -28,7 +28,8 @@ BLOCKS, FOLDS = 20, 5
 FEWEST = 20  # force samples
 SHORT = 1500  # samples that need no stand-in
 LEAST_SHARED = 1e-2  # of the noise's own square: what is shared and less changes nothing
-TARGET = 4000  # samples of the stand-in, where its blocks can be that long
+TARGET, MOST = 4000, 6000  # samples of the stand-in, where its blocks can be that long
+FASTEST, WIDEST = 0.12, 8.0  # growth of blocks; times what the travel within one may make of force
 
 
 @dataclass(frozen=True)
@@ -334,12 +335,13 @@ def _blocks(full: Data, stiffness: float, sigma_force: float, jump_mm: float) ->
     n = full.size
     if n <= SHORT:
         return np.arange(n)
-    rate = 0.05
+    rate, wider = 0.05, 1.0
     while True:
-        owner = _grouped(full, stiffness, sigma_force * (rate / 0.05), rate, jump_mm)
-        if owner[-1] < TARGET or rate > 0.12:
+        owner = _grouped(full, stiffness, wider * sigma_force * (rate / 0.05), rate, jump_mm)
+        if owner[-1] < TARGET or (rate > FASTEST and (owner[-1] < MOST or wider >= WIDEST)):
             return owner
-        rate *= 1.4
+        # within a move the force goes nearly straight with the position: wide blocks hide less there than after corners
+        rate, wider = (rate, 2.0 * wider) if rate > FASTEST else (1.4 * rate, wider)
 
 
 def _grouped(full: Data, stiffness: float, step_N: float, rate: float, jump_mm: float) -> NDArray[np.intp]:

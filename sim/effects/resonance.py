@@ -40,7 +40,7 @@ from sim.jit import State, block, compiled
 
 _Y, _SPEED, _LAST, _STARTED, _AFTER, _AFTER_SPEED = range(6)
 
-_TURN, _MOST_PARTS = 0.3, 200
+_TURN, _MOST_PARTS = 0.3, 32
 """Angle of a swing, rad, that a part of a step takes at the most; parts of a step."""
 
 

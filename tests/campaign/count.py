@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .judge import named
+from .judge import listed, named
 
 Line = dict[str, Any]
 
@@ -73,9 +73,7 @@ def right_listed(line: Line) -> bool:
     """Whether a hidden id is the first cause or among what is said not to be excluded in its place."""
     if right_first(line) or not line["said"]["causes"]:
         return right_first(line)
-    return any(
-        a["id"] in line["item"]["ids"] and not a.get("excluded") for a in line["said"]["causes"][0]["alternatives"]
-    )
+    return any(listed(line["said"]["causes"][0], id) for id in line["item"]["ids"])
 
 
 def right_or_alike(line: Line) -> bool:
@@ -86,6 +84,11 @@ def right_or_alike(line: Line) -> bool:
 def found(line: Line, id: str) -> bool:
     """Whether an id is named at any place."""
     return named(line, id) is not None
+
+
+def found_or_alike(line: Line, id: str) -> bool:
+    """Whether an id of a pair is named, or listed beside one that fits the data without noise as well in its place."""
+    return found(line, id) or id in line.get("alike", {})
 
 
 def spurious(line: Line) -> bool:

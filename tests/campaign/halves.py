@@ -21,6 +21,7 @@ from .count import (
     causes,
     detectable,
     found,
+    found_or_alike,
     least_beside,
     rate,
     right_first,
@@ -83,6 +84,9 @@ def shaped(by: Mapping[str, Sequence[Line]]) -> list[Figure]:
     def both(line: Line) -> bool:
         return all(found(line, id) for id in line["item"]["ids"])
 
+    def both_or_alike(line: Line) -> bool:
+        return all(found_or_alike(line, id) for id in line["item"]["ids"])
+
     def both_alone(line: Line) -> bool:
         return sorted(causes(line)) == sorted(line["item"]["ids"])
 
@@ -97,6 +101,7 @@ def shaped(by: Mapping[str, Sequence[Line]]) -> list[Figure]:
         Figure("unexplained, single, detectable", 0.03, False, rate(single, unexplained)),
         Figure("spurious second cause, single, detectable", 0.03, False, rate(single, spurious)),
         Figure("both of a pair named", 0.90, True, rate(pairs, both)),
+        Figure("… or listed beside one that fits as well", 0.90, True, rate(pairs, both_or_alike)),
         Figure("… and nothing else", None, True, rate(pairs, both_alone)),
         Figure("… each seen beside the other, χ² ≥ 600", None, True, rate(plain, both)),
         Figure("outside the catalogue: unexplained", 0.93, True, rate(outside, unexplained)),

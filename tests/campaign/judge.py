@@ -20,7 +20,7 @@ from tests.truth.beside import seen_beside
 from tests.truth.cases import Case, draw_case
 from tests.truth.detect import Lab, _sigma, _whitened, freed, misfit, of_the_pad, sampling
 from tests.truth.noise import Coloured, Quantised, StudentT, White
-from tests.truth.rivals import as_good
+from tests.truth.rivals import as_good, as_good_in_place
 
 from .plan import Item
 
@@ -56,6 +56,7 @@ def run(item: Item, keep: Path | None = None) -> dict[str, Any]:
             line |= diagnosed(case, case.write(keep))
         line["bounds"] = _bounds(item, line)
         line["as_good"] = _as_good(item, case, line)
+        line["alike"] = _alike(item, case, line)
     except Exception:
         line["error"] = traceback.format_exc(limit=-4)
     return line
@@ -138,6 +139,22 @@ def score_flags(case: Case, force_time_s: np.ndarray, flags: dict[str, list[int]
 def named(line: dict[str, Any], id: str) -> dict[str, Any] | None:
     """The cause of that id, if it was named."""
     return next((cause for cause in line["said"]["causes"] if cause["id"] == id), None)
+
+
+def listed(cause: dict[str, Any], id: str) -> bool:
+    """Whether an id is said not to be excluded in a cause's place."""
+    return any(a["id"] == id and not a.get("excluded") for a in cause["alternatives"])
+
+
+def _alike(item: Item, case: Case, line: dict[str, Any]) -> dict[str, str]:
+    """Of a pair, by hidden id that is not named: the one named instead that lists it and fits as well in its place."""
+    causes = line["said"]["causes"]
+    missed = [id for id in item.ids if named(line, id) is None]
+    wrong = [c for c in causes if c["id"] not in item.ids]
+    if item.group != "pair" or not all(line["truth"]["alone"].values()):
+        return {}
+    tried = ((id, c["id"]) for id in missed for c in wrong if listed(c, id))
+    return {id: rival for id, rival in tried if as_good_in_place(case, rival, id)}
 
 
 def _as_good(item: Item, case: Case, line: dict[str, Any]) -> bool:

@@ -127,8 +127,9 @@ WHAT_IS_COUNTED = """
   within χ² of 25 (tests/truth/rivals.py; computed for what makes the force late). *Or not excluded*: without asking
   for that.
 - *Spurious*: a cause after the first that was not hidden. *Both of a pair*: named at any place, of the pairs of which
-  each effect alone would be detectable. *Each seen beside the other*: of those, pairs of which neither effect can be
-  made by the pad's numbers and the other's size but for χ² of 600 (table of pairs below).
+  each effect alone would be detectable. *Or listed …*: one that is not named stands among the alternatives of a name
+  that was not hidden, which in its place fits as well. *Each seen beside the other*: of those, pairs of which neither
+  effect can be made by the pad's numbers and the other's size but for χ² of 600 (table of pairs below).
 - *Parameter*: each of the contract's parameters of a cause that was rightly named first. The bound is that of Cramér
   and Rao for the effect's size with the pad's numbers unknown.
 - *Noise floor*: the deviation of the force noise, and the same with the position's noise through the stiffness. A

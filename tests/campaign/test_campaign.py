@@ -11,7 +11,7 @@ from tests.truth.cases import draw_case
 from tests.truth.effects import EFFECTS
 
 from .__main__ import read
-from .count import Rate, least_beside, right_listed, right_or_alike, spurious, stated, wrongs
+from .count import Rate, found_or_alike, least_beside, right_listed, right_or_alike, spurious, stated, wrongs
 from .halves import half as half_of
 from .judge import bounds, score_flags, truth_of
 from .plan import CATALOGUE, Item, plan
@@ -178,6 +178,16 @@ def test_second_causes_and_alternatives():
     assert not right_or_alike(wrong | {"as_good": False})
     assert not right_or_alike(line([("backlash", 1, 1, ())]) | {"as_good": True})
     assert [s.near for s in stated(line([GOOD]))] == [True] and stated(line([("backlash", 0.1, 0.1, ())])) == []
+
+
+def test_of_a_pair_one_may_be_listed_beside_one_that_fits_as_well():
+    lines = [line([GOOD, ("force_delay", 0.1, 0.1, ("sensor_lag",))], ("friction", "sensor_lag"), "pair")] * 2
+    lines = [lines[0] | {"alike": {"sensor_lag": "force_delay"}}, lines[1] | {"alike": {}}]
+    assert [found_or_alike(own, "sensor_lag") for own in lines] == [True, False]
+    rows = page(lines, "command").splitlines()
+    at = next(k for k, row in enumerate(rows) if row.startswith("| both of a pair named"))
+    shares = [[cell.strip() for cell in row.strip("|").split("|")][:3:2] for row in rows[at : at + 2]]
+    assert shares == [["both of a pair named", "0.0 %"], ["… or listed beside one that fits as well", "50.0 %"]]
 
 
 def test_the_page_counts():

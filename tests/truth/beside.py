@@ -28,10 +28,10 @@ FAULTS = ("outliers", "stuck_samples")
 """What nothing else imitates."""
 
 
-def seen_beside(case: Case) -> dict[str, float]:
-    """Of each effect of a pair, χ² of what it makes that neither the other's size nor the pad's numbers can."""
+def drawn_again(case: Case, *ids: str, **factors: float) -> Case:
+    """The case with these of its effects alone, each at its size times a factor. Jitter is left out: it would be drawn
+    anew, and is noise and no effect."""
     truth = case.truth
-    # Jitter is left out: it would be drawn anew, and is noise and no effect.
     told = truth.overrides | {
         "drawn": truth.drawn,
         "motion": truth.motion,
@@ -39,12 +39,20 @@ def seen_beside(case: Case) -> dict[str, float]:
         "own_clock": case.force_time_s is not None,
         "jitter": "none",
     }
+    sizes = {id: truth.sizes[id] * factors.get(id, 1.0) for id in ids}
+    return draw_case(truth.seed, ids, sizes, {id: truth.shapes[id] for id in ids}, **told)
 
-    def drawn(*ids: str, **factors: float) -> Case:
-        sizes = {id: truth.sizes[id] * factors.get(id, 1.0) for id in ids}
-        return draw_case(truth.seed, ids, sizes, {id: truth.shapes[id] for id in ids}, **told)
 
-    both = drawn(*truth.ids)
+def slope(case: Case, id: str, *ids: str) -> Array:
+    """How the force beyond the plain pad's goes with the size of one of the effects `ids`, N."""
+    more, less = (_beyond(drawn_again(case, *ids, **{id: 1 + sign * STEP})) for sign in (1, -1))
+    return more - less
+
+
+def seen_beside(case: Case) -> dict[str, float]:
+    """Of each effect of a pair, χ² of what it makes that neither the other's size nor the pad's numbers can."""
+    truth = case.truth
+    both = drawn_again(case, *truth.ids)
     lab = Lab(both.truth)
     sigma = _sigma(both.truth, lab)
 
@@ -55,9 +63,8 @@ def seen_beside(case: Case) -> dict[str, float]:
     out = {}
     for id in truth.ids:
         (other,) = (known for known in truth.ids if known != id)
-        more, less = (_beyond(drawn(*truth.ids, **{other: 1 + sign * STEP})) for sign in (1, -1))
-        own = weighed(_beyond(both) - _beyond(drawn(other)))
-        left = freed(own, [*of_pad, weighed(more - less)])
+        own = weighed(_beyond(both) - _beyond(drawn_again(case, other)))
+        left = freed(own, [*of_pad, weighed(slope(case, other, *truth.ids))])
         out[id] = float(left @ left)
         if id in FAULTS:
             out[id] += _faults(both.truth, sigma)

@@ -15,9 +15,11 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from scipy.optimize import least_squares
 
+from .beside import drawn_again, slope
 from .cases import Case
-from .detect import Lab, _coordinates, _pad, fitted, misfit
+from .detect import Lab, _coordinates, _pad, _sigma, _whitened, fitted, freed, misfit, of_the_pad
 from .effects.sensor import first_order, second_order
 
 AS_GOOD = 25.0
@@ -66,6 +68,8 @@ def _gaining(t: np.ndarray, force: np.ndarray, x: np.ndarray, sign: float = 1.0)
 
 
 CHANCE = ("force_delay",)
+CLOCKED = ("force_delay", "clock_skew")
+"""Effects that change when a sample was felt: beside them a rival's force would have to be asked for elsewhere."""
 
 STAGES: dict[str, tuple[tuple[Stage, tuple[float, ...]], ...]] = {
     "force_delay": ((_delayed, ()),),
@@ -107,3 +111,41 @@ def as_good(case: Case, id: str) -> bool:
         return rival is not None and rival <= AS_GOOD
     own = left_beside(case, hidden)
     return own is not None and rival <= own + AS_GOOD
+
+
+def left_in_place(case: Case, rival: str, hidden: str) -> float | None:
+    """χ² that a pair leaves with the rival in place of one of its two effects; None: nothing is known of that.
+
+    The pad's numbers and the other effect's size are free to first order, as in `beside`; the rival's own wholly.
+    """
+    (other,) = (id for id in case.truth.ids if id != hidden)
+    if rival not in STAGES or other in CLOCKED:
+        return None
+    both, alone = drawn_again(case, *case.truth.ids), drawn_again(case, other)
+    truth, fine, lab = both.truth, alone.truth.fine, Lab(both.truth)
+    sigma, label = _sigma(truth, lab), truth.label_time_s
+
+    def weighed(force: np.ndarray) -> np.ndarray:
+        return _whitened(truth.noise, label, force * truth.noise.std / sigma)
+
+    columns = [*of_the_pad(truth, lab, weighed), weighed(slope(case, other, other))]
+    own = truth.clean_N - alone.truth.clean_N
+
+    def left(x: np.ndarray, stage: Stage) -> np.ndarray:
+        late = stage(fine.time_s, fine.force_N, x) - fine.force_N
+        return freed(weighed(own - np.interp(label, fine.time_s, late)), columns)
+
+    best = np.inf
+    for stage, more in STAGES[rival]:
+        starts = [np.array([np.log(late), *more]) for late in LATE_S]
+        start = min(starts, key=lambda x: float(np.sum(left(x, stage) ** 2)))
+        best = min(best, 2 * float(least_squares(left, start, args=(stage,), method="lm", max_nfev=60).cost))
+        if best <= AS_GOOD:
+            break
+    return best
+
+
+def as_good_in_place(case: Case, rival: str, hidden: str) -> bool:
+    """Whether the rival fits the noise-free data of a pair as well in place of one of its effects."""
+    left = left_in_place(case, rival, hidden)
+    return left is not None and left <= AS_GOOD

@@ -6,7 +6,7 @@ import pytest
 from .cases import draw_case
 from .detect import ENOUGH, Lab, _sigma, misfit
 from .motion import Path
-from .rivals import AS_GOOD, STAGES, as_good, left_beside
+from .rivals import AS_GOOD, STAGES, as_good, as_good_in_place, left_beside, left_in_place
 
 MOTION = Path(-0.2).hold(0.3).to(1.5, 20.0).hold(0.6).to(0.8, 8.0).hold(0.6).to(-0.2, 20.0).hold(0.3).motion()
 PLAIN = {
@@ -72,3 +72,31 @@ def test_what_is_left_of_a_lag_under_a_steady_ramp_is_the_lag_once():
 def test_a_name_that_makes_nothing_late_is_not_judged():
     case = draw_case(3, ("force_delay",), 1.0, "pure", rate_hz=1000.0, **PLAIN)
     assert "friction" not in STAGES and left_beside(case, "friction") is None and not as_good(case, "friction")
+
+
+BOTH = {"contact_offset": "fixed", "sensor_lag": "first_order", "cogging": "sine", "resonance": "second_order"}
+
+
+@pytest.mark.parametrize(("id", "other"), [("sensor_lag", "cogging"), ("resonance", "contact_offset")])
+def test_in_a_pair_the_right_name_leaves_next_to_nothing_and_a_wrong_one_what_it_leaves_alone(id, other):
+    sizes, shapes = {id: 2.5, other: 1.0}, {id: BOTH[id], other: BOTH[other]}
+    case = draw_case(3, (id, other), sizes, shapes, rate_hz=1000.0, **PLAIN)
+    right, wrong = left_in_place(case, id, id), left_in_place(case, "force_delay", id)
+    alone = left_beside(case.alone(id), "force_delay")
+    # To first order only: the pad's numbers and the other's size are held by it.
+    assert right < 0.05 * wrong and wrong == pytest.approx(alone, rel=0.3)
+    assert not as_good_in_place(case, "force_delay", id)
+
+
+def test_in_a_pair_too_a_lag_passes_for_a_delay_where_only_the_mean_lateness_is_seen():
+    told = PLAIN | {"noise_N": 0.03, "rate_hz": 150.0}
+    shapes = {"sensor_lag": "first_order", "cogging": "sine"}
+    case = draw_case(5, ("cogging", "sensor_lag"), {"cogging": 1.0, "sensor_lag": 0.5}, shapes, **told)
+    assert misfit(case.alone("sensor_lag")).chi2 > ENOUGH and as_good_in_place(case, "force_delay", "sensor_lag")
+
+
+def test_beside_another_clock_and_of_a_name_that_makes_nothing_late_nothing_is_known():
+    shapes = {"sensor_lag": "first_order", "clock_skew": "stamped"}
+    case = draw_case(3, ("clock_skew", "sensor_lag"), 1.0, shapes, rate_hz=1000.0, **(PLAIN | {"own_clock": True}))
+    assert left_in_place(case, "force_delay", "sensor_lag") is None
+    assert left_in_place(case, "friction", "clock_skew") is None
