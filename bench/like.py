@@ -26,7 +26,7 @@ from bench.diagnose.channel import Faults, faults, standing_off
 from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import NEAR
 from bench.errors import InputError
-from bench.felt_motion import felt
+from bench.felt_motion import felt, resolution
 from bench.identify.problem import sized
 from bench.recording.types import Measurement
 from bench.restamp import restamped
@@ -183,7 +183,8 @@ def _spoiled(measurement: Measurement, simulated_N: Array, rmse_N: float, alone:
     if not rmse_N <= NEAR * noise_N:
         return ~alone.good
     faulty = alone.by_itself
-    return faulty | standing_off(measurement.force_N - simulated_N, ~faulty, alone.outlier)
+    step_N = resolution(measurement.force_N)
+    return faulty | standing_off(measurement.force_N - simulated_N, ~faulty, alone.outlier, step_N)
 
 
 def _least(cost: Callable[[float], float], std_mm: float) -> float:

@@ -209,7 +209,7 @@ class Signatures:
         Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
         self.Q = [np.ascontiguousarray(q) for q in Q.T]
         self.residual = self._clear(data.whitened(data.force_N - self.force))
-        self.waves: dict[tuple[str, float, float], Array] = {}  # by effect, period and phase: its forms share them
+        self.waves: dict[tuple[str, str, float, float], Array] = {}  # by wave, period and phase: forms share them
 
     def _clear(self, column: Array) -> Array:
         for q in self.Q:
@@ -318,11 +318,12 @@ def starts(
 
 def _rippling(signatures: Signatures, effect: Effect, cause: Cause, most: int) -> list[Start]:
     """Starts of what repeats with the position."""
-    sine, amplitude = cause_of(effect, effect.forms[0]), cause.amplitude
+    plain = {p.name for p in cause.form.parameters} == {p.name for p in effect.forms[0].parameters}
+    sine, amplitude = cause_of(effect, cause.form if plain else effect.forms[0]), cause.amplitude
     assert amplitude is not None
 
     def column(period_mm: float, phase_rad: float) -> Array:
-        key = (effect.id, period_mm, phase_rad)
+        key = (effect.id, sine.form.name, period_mm, phase_rad)
         if key not in signatures.waves:
             signatures.waves[key] = signatures.column(sine.with_start(period=period_mm, phase=phase_rad))
         return signatures.waves[key]

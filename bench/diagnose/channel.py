@@ -43,6 +43,7 @@ BESIDE = 5  # neighbours on either side that a stray sample is held against: bur
 ASIDE, CALM = 8, 0.6  # neighbours on either side of a force or a residual, and their share that a burst leaves alone
 FAR = 6.0  # noise deviations that an outlier stands off at the least
 FEW, ALONE = 3, 1.7  # outliers that are a fault; and times further off is one that is no fault, but no noise either
+HEAPS = 3.0  # steps of a coarse channel within which its noise is
 BULK = 9.0  # medians of the size: within some six deviations of white noise
 DOUBT = 2.0  # of the logarithm of the likelihood of a tail: two standard deviations
 DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
@@ -402,10 +403,11 @@ def resting(m: Measurement) -> Mask:
     return still
 
 
-def standing_off(residual: Array, good: Mask, suspect: Mask) -> Mask:
+def standing_off(residual: Array, good: Mask, suspect: Mask, step_N: float) -> Mask:
     """Outliers against a model: residuals (m,), single or in short bursts, far beyond most of their neighbours'.
 
-    `suspect` (m,): those that stood off before there was a model, and for which half the distance is enough.
+    `suspect` (m,): those that stood off before there was a model, and for which half the distance is enough; `step_N`:
+    of the channel, which noise of that size comes in.
     """
     mask = np.zeros(len(residual), dtype=bool)
     index = np.flatnonzero(good)
@@ -416,7 +418,10 @@ def standing_off(residual: Array, good: Mask, suspect: Mask) -> Mask:
     middle = np.median(around, axis=0)
     calm = np.quantile(np.abs(around - middle), CALM, axis=0)
     limit = far(e - middle)
-    limits = np.where(suspect[index], 0.5, 1.0) * limit
+    # where a step is as large as the noise, values come in heaps, of which no tail is foretold
+    heaps = (e - middle)[np.abs(e - middle) <= HEAPS * step_N]
+    coarse = FAR * float(np.sqrt(np.mean(heaps**2))) if len(heaps) else 0.0
+    limits = np.maximum(np.where(suspect[index], 0.5, 1.0) * limit, coarse)
     reach = 3.0 * np.maximum(calm - float(np.median(calm)), 0.0)
     mask[index[_beyond(np.abs(e - middle), limits, reach)]] = True
     return mask

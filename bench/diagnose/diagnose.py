@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from bench import identify
 from bench.errors import InputError
+from bench.felt_motion import resolution
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 from sim.effects import all_effects
@@ -325,7 +326,7 @@ def _asked_again(
     modelled[prepared.kept] = force_at(full, fit.structure, fit.x)[at]
     errors[prepared.kept] = full.force_N[at] - modelled[prepared.kept]
     known = np.isfinite(errors) & ~flags.by_itself
-    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect)
+    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect, resolution(m.force_N))
     outlier &= ~of_the_model(modelled, errors, outlier)
     pulsed = _in_holds_too(m, pulses(np.where(np.isfinite(errors), errors, 0.0), known))
     outlier |= pulsed

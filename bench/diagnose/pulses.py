@@ -1,4 +1,5 @@
-"""Pulses in the force channel: what rises at once and is gone some samples later, as surges on a line make it.
+"""Pulses in the force channel: what is there at once and is gone some samples later, as surges on a line make it, or
+bursts of wrong readings.
 
 Longer than a stray sample or a burst of some (`channel`), so that neighbours tell nothing: half of them may be in it.
 Told by its onset, which is far beyond what came before, and by its end, where the force is back (IEC 61000-4-5: surges
@@ -21,6 +22,7 @@ SHORTEST, LONGEST = 3, 40  # samples of a pulse: shorter ones are strays
 ONSET = 12.0  # noise deviations of its first sample
 ENDED = 5.0  # noise deviations within which the force is back
 STEEP = 3.0  # times what the samples before differ by
+WHOLLY = 0.2  # of a burst that goes both ways, so much at the most is not far off: it jumps, and does not swing
 
 
 def pulses(values: Array, good: Mask) -> Mask:
@@ -42,20 +44,18 @@ def pulses(values: Array, good: Mask) -> Mask:
         if first < ends:
             continue
         last = _end(y, first, float(level[k]), max(ENDED * noise, float(differ[k])))
-        if last - first < SHORTEST or np.median(np.abs(y[first:last] - level[k])) < ONSET * noise:
+        off = y[first:last] - level[k]
+        if last - first < SHORTEST or np.median(np.abs(off)) < ONSET * noise:
             continue
+        if off.min() < 0.0 < off.max() and np.quantile(np.abs(off), WHOLLY) < ONSET * noise:
+            continue  # what swings goes through the middle
         ends = last
         mask[index[first:ends]] = True
     return mask
 
 
 def _end(y: Array, first: int, level: float, near: float) -> int:
-    """Index behind a pulse that begins at `first`; `first` where it does not come back, or goes to the other side."""
-    off = y[first : first + LONGEST + BACK] - level
-    close = np.abs(off) < near
-    for n in range(1, len(off) - BACK + 1):
-        if close[n : n + BACK].all():
-            return first + n
-        if off[n] * off[0] < 0.0 and not close[n]:
-            break
-    return first
+    """Index behind a pulse that begins at `first`; `first` where it does not come back."""
+    close = np.abs(y[first : first + LONGEST + BACK] - level) < near
+    back = np.flatnonzero(np.convolve(close, np.ones(BACK), mode="valid") > BACK - 0.5)
+    return first + int(back[0]) if len(back) else first

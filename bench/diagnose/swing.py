@@ -41,6 +41,7 @@ def find(time_s: Array, error_N: Array, sample_s: float) -> Swing | None:
     grid[slot] = error_N - error_N.mean()
     power = np.abs(np.fft.rfft(grid)) ** 2
     frequency = np.fft.rfftfreq(len(grid), sample_s)
+    filled = len(error_N) / len(grid)  # where holds are short and far apart, neighbouring ordinates say the same
     first = max(SPARED, int(np.searchsorted(frequency, LOWEST_HZ)))
     edges = _edges(first, len(power) - 1)
     if len(edges) < 5:
@@ -55,9 +56,9 @@ def find(time_s: Array, error_N: Array, sample_s: float) -> Swing | None:
     ground = np.convolve(level * count, kernel, "valid") / together
     for k in range(GROUND, len(level)):
         low = int(np.argmin(ground[: k - GROUND + 1]))
-        chance = np.asarray(chi2_law.isf(CHANCE, 2 * count[k])) / (2 * count[k])
-        chance /= np.asarray(chi2_law.ppf(CHANCE, 2 * together[low])) / (2 * together[low])
-        if level[k] > max(RISE, float(chance)) * ground[low]:
+        own, others = 2 * filled * count[k], 2 * filled * together[low]
+        chance = float(chi2_law.isf(CHANCE, own)) / own / (float(chi2_law.ppf(CHANCE, others)) / others)
+        if level[k] > max(RISE, chance) * ground[low]:
             above[k] = (level[k] - ground[low]) * count[k]
     share = float(above.sum() / max(power[first:].sum(), 1e-300))
     if share < LEAST_SHARE:

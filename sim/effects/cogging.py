@@ -1,6 +1,7 @@
 """Cogging: a force periodic in position, as the magnets of a linear motor pull on its iron; felt by the cell.
 
 - `sine`: amplitude · sin(2π y/period + phase).
+- `tared`: the sine less its value at the first sample, where the force was taken for zero.
 - `harmonics`: with a second harmonic, ratio · amplitude.
 - `swelling`: the sine grows along the way, as towards the end of the magnets: amplitude · (1 + growth (y − at_depth)).
 - `trailing`: the sine of a place that is dragged along, as iron's field is behind the magnets': the middle of a play of
@@ -38,6 +39,16 @@ from sim.jit import State, block
 def sine(dt: float, y: float, state: State, p: State) -> float:
     """Force in N; p = (amplitude, period, phase)."""
     return p[0] * math.sin(2.0 * math.pi * y / p[1] + p[2])
+
+
+@block
+def tared(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase); state: started, the place of the tare."""
+    if state[0] == 0.0:
+        state[0] = 1.0
+        state[1] = y
+    wave = 2.0 * math.pi / p[1]
+    return p[0] * (math.sin(wave * y + p[2]) - math.sin(wave * state[1] + p[2]))
 
 
 @block
@@ -151,6 +162,13 @@ EFFECT = Effect(
             what="one sine",
             parameters=(_AMPLITUDE, _PERIOD, PHASE),
             blocks={"probe": sine},
+        ),
+        Form(
+            name="tared",
+            what="one sine, nothing at the first sample, where the force was set to zero",
+            parameters=(_AMPLITUDE, _PERIOD, PHASE),
+            blocks={"probe": tared},
+            state=(0.0, 0.0),
         ),
         Form(
             name="harmonics",

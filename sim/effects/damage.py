@@ -128,7 +128,7 @@ _RATE = Parameter(
     amplitude=True,
     starts=(0.003, 0.03),
 )
-_FLOOR = Parameter("floor", "1", 0.0, 0.95, 0.0, "share of the stiffness that stays", starts=(0.0, 0.5))
+_FLOOR = Parameter("floor", "1", 0.0, 0.998, 0.0, "share of the stiffness that stays", starts=(0.0, 0.5, 0.96))
 _DEAD_BAND = Parameter("dead_band", "mm", 0.0, 0.1, 0.004, "gain of depth that counts as noise", fixed=True)
 _POWER = Parameter("power", "1", -4.0, 12.0, 1.0, "0: exponential, 1: hyperbolic, -1: linear", starts=(-1.0, 1.0))
 _EXPONENT = Parameter("exponent", "1", 0.0, 5.0, 1.0, "power of depth that weights the travel", starts=(1.0, 2.0))

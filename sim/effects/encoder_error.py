@@ -1,6 +1,7 @@
 """Encoder error: the reported position is off by an error that repeats with the pitch of the scale.
 
 - `sine`: reported = true + amplitude · sin(2π true/period + phase).
+- `zeroed`: the sine less its value at 0: a surface that was found through the encoder itself is where it reports 0.
 - `harmonics`: with a second harmonic, ratio · amplitude. Unequal offsets of the two quadrature signals make the first
   harmonic, unequal gains and a phase other than 90° the second (P. L. M. Heydemann, Determination and correction of
   quadrature fringe measurement errors in interferometers, Appl. Opt. 20, 1981, 3382–3384).
@@ -34,6 +35,12 @@ _BLUNT = 1e-6  # a sharpness below is a sine
 def sine(dt: float, x: float, state: State, p: State) -> float:
     """Reported position; p = (amplitude, wave number, phase)."""
     return x + p[0] * math.sin(p[1] * x + p[2])
+
+
+@block
+def zeroed(dt: float, x: float, state: State, p: State) -> float:
+    """Reported position; p = (amplitude, wave number, phase, …)."""
+    return x + p[0] * (math.sin(p[1] * x + p[2]) - math.sin(p[2]))
 
 
 @block
@@ -128,6 +135,13 @@ EFFECT = Effect(
             what="one sine",
             parameters=(_AMPLITUDE, _PERIOD, PHASE),
             blocks={"report": sine},
+            pack=_packed,
+        ),
+        Form(
+            name="zeroed",
+            what="one sine, nothing at the surface, which was found through it",
+            parameters=(_AMPLITUDE, _PERIOD, PHASE),
+            blocks={"report": zeroed},
             pack=_packed,
         ),
         Form(

@@ -8,6 +8,8 @@ The factor on F^e depends on depth δ and on the deepest depth so far; loading b
 - `ratio`: (δ/deepest)^a, with an exponent a by which the share is gone at twice `depth` below `reach` (Z. Q. Guo, L. J.
   Sluys, Computational modelling of the stress-softening phenomenon of rubber-like materials under cyclic loading, Eur.
   J. Mech. A 25, 2006, 877–896). One number: `depth` only says where the share is stated.
+- `relative`: 1 − share · (1 − (δ/deepest)^a): as `ratio`, but no more than the share, which is gone at the surface; a
+  such that 1 − 1/e of it is gone at `depth` below `reach`: 1 where that is 0.63 of `reach`.
 - `root`: e^(−a √(deepest − δ)), with a by which the share is gone at twice `depth`: much of it close below the deepest
   point (A. E. Zúñiga, M. F. Beatty, A new phenomenological model for stress-softening in elastomers, Z. Angew. Math.
   Phys. 53, 2002, 794–814). One number, too.
@@ -108,6 +110,14 @@ def ratio(dt: float, depth: float, state: State, p: State) -> float:
 
 
 @block
+def relative(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (share, exponent, already)."""
+    here = max(depth, 0.0)
+    state[0] = max(state[0], here, p[2])
+    return 1.0 - p[0] * (1.0 - (here / state[0]) ** p[1]) if state[0] > 0.0 else 1.0
+
+
+@block
 def virgin(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (share, depth, already)."""
     here = max(depth, 0.0)
@@ -122,6 +132,12 @@ def _exponent(values: Mapping[str, float]) -> tuple[float, ...]:
     """What `ratio` reads."""
     left = 1.0 - min(2.0 * values["depth"] / values["reach"], _IN_THE_PAD)
     return (math.log1p(-values["share"]) / math.log(left), values["already"])
+
+
+def _relative(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `relative` reads."""
+    left = 1.0 - min(values["depth"] / values["reach"], 0.999)
+    return (values["share"], -1.0 / math.log(left), values["already"])
 
 
 @block
@@ -293,6 +309,20 @@ EFFECT = Effect(
             blocks={"elastic": ratio},
             state=(0.0,),
             pack=_exponent,
+        ),
+        Form(
+            name="relative",
+            what="softer with the depth over the deepest, most at the surface",
+            parameters=(
+                _SHARE,
+                _DEPTH,
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth below which `depth` counts", fixed=True),
+                _ALREADY,
+            ),
+            sought=False,
+            blocks={"elastic": relative},
+            state=(0.0,),
+            pack=_relative,
         ),
         Form(
             name="root",

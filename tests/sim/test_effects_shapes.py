@@ -387,3 +387,31 @@ def test_softening_until_a_little_beyond_the_deepest_point() -> None:
     assert_allclose(factor[425:499], 1.0)
     # A fifteenth of the way that it takes, and not more than that further.
     assert_allclose(factor[-2:], 1.0 - 0.3 * -np.expm1(-(3.0 * (1.0 + 0.1 / 15.0) - x[-2:]) / 0.5))
+
+
+def test_cogging_that_was_there_when_the_force_was_set_to_zero() -> None:
+    x = np.linspace(-1.0, -3.0, 41)
+    force = simulate(AIR, [active("cogging", "tared", amplitude=0.2, period=1.5, phase=0.4)], np.arange(41.0), x)
+    wave = np.sin(2 * math.pi * x / 1.5 + 0.4)
+    assert_allclose(force, 0.2 * (wave - wave[0]), atol=1e-14)
+
+
+def test_an_encoder_error_that_the_touch_off_went_through() -> None:
+    x = np.linspace(0.0, 2.0, 81)
+    zeroed = active("encoder_error", "zeroed", amplitude=0.02, period=0.9, phase=1.1)
+    plant = Cascade(LINEAR, [zeroed]).plant()
+    reported = np.array([plant.reported_mm(float(here)) for here in x])
+    assert reported[0] == 0.0
+    assert_allclose(reported - x, 0.02 * (np.sin(2 * math.pi * x / 0.9 + 1.1) - math.sin(1.1)), atol=1e-15)
+
+
+def test_softening_with_the_depth_over_the_deepest() -> None:
+    x = np.array([0.0, 1.0, 0.5, 0.0, 2.0, 1.0, 0.5, 3.0])
+    depth = 2.0 * (1.0 - math.exp(-1.0))  # below a reach of 2: then it goes in proportion
+    softens = active("stress_softening", "relative", share=0.3, depth=depth, reach=2.0)
+    force = simulate(LINEAR, [softens], np.arange(8.0), x)
+    deepest = np.maximum.accumulate(x)
+    assert_allclose(force[1:], K * x[1:] * (1.0 - 0.3 * (1.0 - x[1:] / deepest[1:])), rtol=1e-12)
+    at_once = active("stress_softening", "relative", share=0.3, depth=2.0 * (1.0 - math.exp(-0.5)), reach=2.0)
+    force = simulate(LINEAR, [at_once], np.arange(8.0), x)  # and with a square
+    assert_allclose(force[1:], K * x[1:] * (1.0 - 0.3 * (1.0 - (x[1:] / deepest[1:]) ** 2)), rtol=1e-12)

@@ -53,6 +53,16 @@ def test_noise_does_not_swing_however_few_its_samples_are():
         assert swing.find(0.008 * np.arange(2500), noise, 0.008) is None
 
 
+def test_noise_in_short_holds_far_apart_does_not_swing():
+    """Gaps smear each ordinate of the spectrum over its neighbours: they are fewer than they look."""
+    n, alarms = 4634, 0
+    held = np.arange(n) % (n // 8) < 79
+    for seed in range(300):
+        noise = np.random.default_rng(seed).standard_normal(n)
+        alarms += swing.find(0.008 * np.arange(n)[held], noise[held], 0.008) is not None
+    assert alarms <= 3
+
+
 def test_what_stands_beside_a_swing_is_told():
     rng, t = np.random.default_rng(5), 0.002 * np.arange(20_000)
     turn = np.exp((-0.02 + 1j) * 2.0 * np.pi * 5.0 * 0.002)

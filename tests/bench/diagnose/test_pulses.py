@@ -32,6 +32,18 @@ def test_surges_are_told_by_how_they_begin_and_end(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_bursts_of_wrong_readings_go_both_ways(seed: int) -> None:
+    force, rng = still(seed)
+    made = np.zeros(len(force), dtype=bool)
+    for begin in range(100, 3900, 200):
+        length = int(rng.integers(4, 16))
+        made[begin : begin + length] = True
+        force[begin : begin + length] += rng.choice([-1.0, 1.0], length) * rng.uniform(0.3, 0.8, length)
+    found = pulses(force, np.ones(len(force), dtype=bool))
+    assert np.array_equal(found, made)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_steps_ramps_and_rings_are_none(seed: int) -> None:
     force, rng = still(seed)
     step, ramp = np.where(np.arange(4000) < 1000, 0.0, 2.0), np.clip((np.arange(4000) - 2000) / 15.0, 0.0, 1.0)

@@ -3,9 +3,11 @@ independent simulator; rates over consecutive seeds."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from bench.diagnose import Diagnosis, diagnose
+from bench.diagnose.channel import standing_off
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
 from tests.truth.cases import Case, draw_case
@@ -45,3 +47,16 @@ def test_a_mode_beyond_half_the_rate_of_sampling_is_found():
     """Some 110 to 200 Hz at 200 samples a second; the fastest may be too little to be seen."""
     found = [d.causes[0].id if d.causes else "" for _, d in said("resonance", "second_order", 0.15, "rich", 200.0)]
     assert found.count("resonance") >= len(SEEDS) - 1
+
+
+def test_noise_in_heaps_has_no_strays_and_strays_stand_off_it():
+    """Where a channel's step is twice the noise, most readings of a slow force say one of two values."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        force = 3.0 + np.exp(-np.linspace(0.0, 3.0, 8000))
+        left = 0.05 * np.round((force + 0.025 * rng.standard_normal(8000)) / 0.05) - force
+        everything, none = np.ones(8000, dtype=bool), np.zeros(8000, dtype=bool)
+        assert not standing_off(left, everything, none, 0.05).any()
+        stray = rng.choice(8000, 12, replace=False)
+        left[stray] += 0.5
+        assert np.array_equal(np.flatnonzero(standing_off(left, everything, none, 0.05)), np.sort(stray))
