@@ -253,8 +253,8 @@ def _beside(force: Array) -> Array:
 
 
 def _neighbours(values: Array, reach: int) -> Array:
-    """Of each value (m,) the others up to so many away on either side (2 reach, m), the ends repeated."""
-    padded = np.pad(values, reach, mode="edge")
+    """Of each value (m,) the others up to so many away on either side (2 reach, m), mirrored at the ends."""
+    padded = np.pad(values, reach, mode="reflect")
     return np.stack([padded[k : k + len(values)] for k in range(2 * reach + 1) if k != reach])
 
 
