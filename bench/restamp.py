@@ -1,9 +1,13 @@
-"""Stamps that are off by themselves, put right by the motion: a planned move says when each position was passed.
+"""Stamps that are off by themselves, put right by the motion: a smooth move says when each position was passed.
 
 Where a host stamps samples as they come in, position and force of a row belong together, and its stamp is off by
 chance. The force at a depth is none the worse for it; an acceleration taken from such positions is worth nothing, and
-neither is what a lag answers to. In a move that is a planner's trapezoid but for that, each sample's own place tells
-its time, the better the faster the move.
+neither is what a delay or a lag answers to.
+
+- Most devices sample by a clock of their own: times that are even put all stamps right at once, where the positions of
+  moves lie on smoother curves over those times than over the stamps.
+- Else, in a move that is a planner's trapezoid but for that, each sample's own place tells its time, the better the
+  faster the move.
 """
 
 from __future__ import annotations
@@ -26,6 +30,9 @@ WHITE = 1.3  # von Neumann's ratio, 2 for errors that are independent and 0 for 
 CLEAR = 2.0  # times the noise of position, in squares
 AGREED = 5.0  # standard deviations of χ² within which a move is a trapezoid
 FAR = 4.0  # standard deviations: what is farther off does not decide
+TICK = 1e-3  # of a step: stamps that are off by less are even
+WINDOW, MOST_WINDOWS = 7, 2000  # neighbours that a curve goes through; such curves that are looked at
+BETWEEN, SMOOTHER = 0.2, 0.3  # of curves, that are clear of corners; of what those over the stamps leave
 
 
 def restamped(m: Measurement) -> Measurement:
@@ -38,11 +45,55 @@ def restamped(m: Measurement) -> Measurement:
     at = np.searchsorted(t, stamps)
     if at[-1] >= len(t) or not np.array_equal(t[at], stamps):
         return m
-    late = stamp_errors(t, m.position_mm)
-    if late is None:
-        return m
-    time = t + late
+    time = even_times(t, m.position_mm)
+    if time is None:
+        late = stamp_errors(t, m.position_mm)
+        if late is None:
+            return m
+        time = t + late
     return replace(m, position_time_s=time, force_time_s=time[at])
+
+
+def even_times(time_s: Array, position_mm: Array) -> Array | None:
+    """Even times (n,) that the samples were taken at, s; None where the stamps are as good, or say that there are none.
+
+    Rows may be missing. A sample that a move passes at v is off its curve by v times the error of its stamp: what
+    parabolas over some neighbours leave is compared, over the stamps and over even times.
+    """
+    between = np.diff(time_s)
+    rows_missing = np.cumsum(np.maximum(np.rint(between / float(np.median(between))), 1.0))
+    slots = [np.arange(len(time_s), dtype=np.float64), np.concatenate([[0.0], rows_missing])]
+    lines = [np.polyfit(slot, time_s, 1) for slot in slots]
+    off, slot, step, even = min(
+        ((float(np.std(time_s - np.polyval(line, slot))), slot, float(line[0]), np.polyval(line, slot))
+         for slot, line in zip(slots, lines, strict=True)),
+        key=lambda tried: tried[0],
+    )  # fmt: skip
+    if off < TICK * step or float(np.abs(time_s - even).max()) > 0.5 * step:
+        return None
+    noise = position_noise(position_mm)
+    start = np.arange(0, len(slot) - WINDOW + 1)
+    speed = np.abs(position_mm[start + WINDOW - 1] - position_mm[start]) / (step * (WINDOW - 1))
+    in_a_row = slot[start + WINDOW - 1] - slot[start] == WINDOW - 1
+    start = start[in_a_row & (speed * off > CLEAR * noise)]
+    start = start[:: max(1, len(start) // MOST_WINDOWS)]
+    if len(start) < FEWEST:
+        return None
+    over_even, over_stamps = (
+        _about_parabolas((times[start[:, None] + np.arange(WINDOW)] - times[start][:, None]) / step,
+                         position_mm[start[:, None] + np.arange(WINDOW)])
+        for times in (even, time_s)
+    )  # fmt: skip
+    # corners bend both alike; some moves have no room between theirs
+    clear_even, clear_stamps = (float(np.quantile(left, BETWEEN)) for left in (over_even, over_stamps))
+    return even if clear_even < SMOOTHER * clear_stamps else None
+
+
+def _about_parabolas(u: Array, x: Array) -> Array:
+    """Sum of squares (m,) that a parabola leaves of each row of x over its row of u, both (m, w)."""
+    basis, _ = np.linalg.qr(np.stack([np.ones_like(u), u, u * u], axis=-1))
+    taken = np.einsum("mwk,mw->mk", basis, x)
+    return np.asarray(np.sum((x - np.einsum("mwk,mk->mw", basis, taken)) ** 2, axis=1))
 
 
 def stamp_errors(time_s: Array, position_mm: Array) -> Array | None:
