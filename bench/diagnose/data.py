@@ -118,6 +118,8 @@ class FeltErrors:
     own_N: Array
     shared_N: Array
     stretch: NDArray[np.intp]
+    late_s: float = 0.0
+    """In `own_N` too: the standard deviation of when forces were felt."""
 
     @property
     def total_N(self) -> Array:

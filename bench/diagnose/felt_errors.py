@@ -2,7 +2,8 @@
 
 Friction that turns round within a micrometre, and a mass that feels the second derivative, make much of what is left
 of the encoder's noise, and of what smoothing has bent: no model can say more of the force than the positions do. It is
-found by moving the positions within their doubt, and running the model again.
+found by moving the positions within their doubt, and running the model again. What scatters in when a force was felt
+(`late_by_chance`) is of the same kind.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scipy.ndimage import uniform_filter1d
 from bench.identify.motion import holds
 
 from .data import Data, FeltErrors, Prepared
+from .late_by_chance import force_rate, late_by_chance_s
 from .numbers import Structure
 from .refit import Fit, force_at
 
@@ -28,7 +30,7 @@ SEEN = 0.3  # of the noise: less changes nothing
 
 
 def felt_errors(prepared: Prepared, fit: Fit, rng: np.random.Generator) -> FeltErrors:
-    """What errors of the positions make through the causes of a fit."""
+    """What errors of the positions make through the causes of a fit, and chance in when its forces were felt."""
     stretch, resting = _rests(prepared.full)
     data = replace(prepared.full, tared=None)
     bare = replace(fit.structure, causes=())
@@ -45,14 +47,16 @@ def felt_errors(prepared: Prepared, fit: Fit, rng: np.random.Generator) -> FeltE
         counts = data.weight * resting
         pooled = float(np.sum(counts * shared_N2) / max(counts.sum(), 1.0))
         shared_N2 = np.where(resting, np.maximum(shared_N2, pooled), shared_N2)
+    modelled, late_s = force_at(prepared.full, fit.structure, fit.x), late_by_chance_s(prepared, fit)
+    own_N2 += (late_s * force_rate(prepared.full, modelled)) ** 2
     # no more than is there: what a fit meets well it shall go on meeting
-    left = prepared.full.force_N - force_at(prepared.full, fit.structure, fit.x)
+    left = prepared.full.force_N - modelled
     square = data.weight * (left - _common(stretch, data.weight, left)) ** 2
     counted = np.maximum(uniform_filter1d(data.weight, TOGETHER), 1e-12)
     own_N2 = np.minimum(own_N2, np.maximum(uniform_filter1d(square, TOGETHER), 0.0) / counted)
     least = (SEEN * prepared.noise.force_N) ** 2
     own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
-    return FeltErrors(own_N, shared_N, stretch)
+    return FeltErrors(own_N, shared_N, stretch, late_s)
 
 
 class _Moments:

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .candidates import CHANNEL, Signatures, alike, combinations, forms, narrowed, starts
+from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
 from .felt_errors import felt_errors
+from .late_by_chance import late_by_chance_s
 from .numbers import Cause, cause_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
@@ -36,6 +38,7 @@ MOST_SHAPES = 12  # of a believed cause, that are tried
 RIVALS = 2  # beside the best, that are asked for their best shapes
 SHAPES = 6  # starts of other forms of the causes found that are carried on
 COMPARED = 5  # rivals of a cause that is compared anew
+LATER_BY_CHANCE = 1.3  # times what was known of it
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
 
 
@@ -115,6 +118,8 @@ class Search(Sieve):
         now, first = path.fits[-1], len(path.fits) == 1
         least = least_gain(path.fits[0], self.prepared.memory, self.samples, self.expected, first)
         tried = self._inside(path, self.ranked(now, least=least))
+        if tried and self._late_by_chance(path, tried[0].fit):
+            return self._turn(path)
         every = [t for t in tried if believable(t.fit, self.prepared)]
         present = {c.id for c in now.structure.causes}
         ranked = [t for t in every if t.id not in present]
@@ -247,9 +252,18 @@ class Search(Sieve):
     def _felt(self, path: Path) -> None:
         """What the last fit's causes make of errors of the positions is noise: nothing else tells of it."""
         last = path.fits[-1]
-        if not last.structure.causes:
-            return
-        felt = felt_errors(self.prepared, last, np.random.default_rng(SEED))
+        if last.structure.causes:
+            self._doubting(path, felt_errors(self.prepared, last, np.random.default_rng(SEED)))
+
+    def _late_by_chance(self, path: Path, fit: Fit) -> bool:
+        """Whether the forces of a fit were felt earlier or later by chance, of which nobody knew yet: then that is
+        noise, and what makes them late is asked for again."""
+        if late_by_chance_s(self.prepared, fit) <= LATER_BY_CHANCE * self.prepared.felt.late_s:
+            return False
+        self._doubting(path, felt_errors(self.prepared, fit, np.random.default_rng(SEED)))
+        return True
+
+    def _doubting(self, path: Path, felt: FeltErrors) -> None:
         if np.array_equal(felt.total_N, self.prepared.felt.total_N):
             return
         self.prepared = self.prepared.doubting(felt)
