@@ -14,8 +14,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.fitted_moves import Moves
 from bench.identify.motion import jitter
-from bench.motion_between import Moves, motion_between, planned_moves
+from bench.motion_between import motion_between, planned_moves
+from bench.profiles import Trapezoid
 from sim.jit import compiled
 
 Array = NDArray[np.float64]
@@ -152,6 +154,17 @@ class Felt:
     noise_mm: float
     stretch: NDArray[np.intp]
     rest: NDArray[np.intp]
+    planned: tuple[tuple[float, float, Trapezoid], ...] = ()
+    """(from when, s; to when, s; how) the motion is a planned move."""
+
+    def at(self, time_s: Array) -> Array:
+        """Positions at some times (m,), which rise, mm: of planned moves their own, else linear between the nodes. A
+        mass feels what a chord is off by."""
+        position = np.interp(time_s, self.time_s, self.position_mm)
+        for begin_s, end_s, move in self.planned:
+            inside = slice(*np.searchsorted(time_s, [begin_s, np.nextafter(end_s, np.inf)]))
+            position[inside] = move.position(time_s[inside])
+        return np.asarray(position)
 
     def rest_at(self, time_s: Array) -> NDArray[np.intp]:
         """Number of the rest at some times (m,)."""
@@ -301,4 +314,6 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
         std = np.where(np.abs(np.gradient(clean)) < 2.0 * step, np.maximum(std, coarse), std)
     time, position = motion_between(time_s, clean, noise_mm=left, planned=planned)
     before = np.clip(np.searchsorted(time_s, time, side="right") - 1, 0, len(clean) - 1)
-    return Felt(time, position, np.asarray(np.interp(time, time_s, std)), noise, stretch[before], hold[before])
+    moves = tuple((float(time_s[a]), float(time_s[b]), move) for (a, b), move in sorted(planned.items()))
+    std = np.asarray(np.interp(time, time_s, std))
+    return Felt(time, position, std, noise, stretch[before], hold[before], moves)

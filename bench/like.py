@@ -115,7 +115,8 @@ def _paths(measurement: Measurement) -> Iterator[tuple[Array, Array, Array]]:
     told = restamped(measurement)
     motion = felt(told.position_time_s, told.position_mm)
     if not np.array_equal(motion.position_mm, measurement.position_mm):
-        yield motion.time_s, motion.position_mm, told.force_time_s
+        time, _ = union(motion.time_s, told.force_time_s)
+        yield time, motion.at(time), told.force_time_s
 
 
 def _along(

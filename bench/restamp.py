@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.felt_motion import _rested, position_noise, smoothed
-from bench.motion_between import LEAST, Trapezoid, _from_rest, _grouped, _moving, _trapezoids
+from bench.fitted_moves import fitted_moves, from_rest
+from bench.motion_between import LEAST, _grouped, _moving
+from bench.profiles import Trapezoid
 from bench.recording.types import Measurement
 
 Array = NDArray[np.float64]
@@ -109,12 +111,12 @@ def stamp_errors(time_s: Array, position_mm: Array) -> Array | None:
     clean, _, _ = _rested(position_mm, clean, std, noise, left)
     step = np.diff(time_s)
     moving, _ = _moving(clean, reach, noise)  # slower ones tell nothing
-    groups = [g for g in _grouped(moving, moving) if g[1] - g[0] >= LEAST and _from_rest(moving, clean, g)]
+    groups = [g for g in _grouped(moving, moving) if g[1] - g[0] >= LEAST and from_rest(moving, clean, g)]
     if not groups:
         return None
     speeds = np.array([np.max(np.abs(np.diff(clean[a : b + 1]) / step[a:b])) for a, b in groups])
     allowed = np.maximum(noise, 0.5 * MOST * float(np.median(step)) * speeds)
-    found = sorted(_trapezoids(time_s, clean, moving, groups, reach, allowed, position_mm, INSIDE).items())
+    found = sorted(fitted_moves(time_s, clean, moving, groups, reach, allowed, position_mm, INSIDE).items())
     parts = [_passed(time_s, position_mm, group, move) for group, move in found]
     spread = _spread_s(parts, noise, float(np.median(step)))
     if spread is None:

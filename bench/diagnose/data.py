@@ -270,8 +270,8 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     motion = felt(m.position_time_s, m.position_mm)
     noise = force_noise(m, good)
     sigma_force = max(noise.force_N, resolution(m.force_N) / np.sqrt(12.0), 1e-9)
-    time, position = (motion.time_s, motion.position_mm) if between else (m.position_time_s, m.position_mm)
-    grid, where = union(time, m.force_time_s)
+    grid, where = union(motion.time_s if between else m.position_time_s, m.force_time_s)
+    position = motion.at(grid) if between else np.interp(grid, m.position_time_s, m.position_mm)
     stiffness = stiffness_along(m)
     through = stiffness * np.interp(m.force_time_s, motion.time_s, motion.std_mm)
     sigma, weight, force = np.full(len(grid), sigma_force), np.zeros(len(grid)), np.zeros(len(grid))
@@ -284,7 +284,6 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     stretch = np.unique(stretch, return_inverse=True)[1]
     weight[where] = counted
     force[where], hum[where] = m.force_N, np.where(counted, taken_N, 0.0)
-    position = np.interp(grid, time, position)
     depth = max(float(position.max()), 1e-3)
     full = Data(
         grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))), shared, stretch,

@@ -5,7 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.felt_motion import felt
-from bench.motion_between import _carried_on, _trapezoids
+from bench.fitted_moves import fitted_moves
+from bench.motion_between import _carried_on
 
 Array = NDArray[np.float64]
 
@@ -108,4 +109,4 @@ def test_a_step_within_the_noise_between_rests_of_one_level_is_no_move():
     x[21:24] = [1e-4, 2e-4, 3e-4]
     moving, resting = np.zeros(59, dtype=bool), np.zeros(60, dtype=bool)
     moving[20:23], resting[:20], resting[24:] = True, True, True
-    assert _trapezoids(time, x, moving, [(20, 23)], 1.0, 1e-4, x, resting=resting) == {}
+    assert fitted_moves(time, x, moving, [(20, 23)], 1.0, 1e-4, x, resting=resting) == {}

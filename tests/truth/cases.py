@@ -144,7 +144,7 @@ def draw_case(
 
     `shape` is one for all that have it, or by id. Overrides: law, contact, protocol, rate_hz, noise_kind, noise_N,
     position_noise_mm, position_step_mm, jitter ("none", "sampling", "stamp"), own_clock, believed_jitter, drawn (a
-    DrawnPad), motion.
+    DrawnPad), motion, servo_s (time constant with which the motor follows, critically damped; 0 if not given).
     """
     unknown = set(overrides) - set(_OVERRIDES)
     if unknown:
@@ -167,7 +167,7 @@ def draw_case(
     own_clock = bool(overrides.get("own_clock", channel.random() < 0.3 and resolved))
     build = Build(
         drawn=drawn,
-        plant=Plant(drawn.pad, motion, duration),
+        plant=Plant(drawn.pad, motion, duration, float(overrides.get("servo_s", 0.0))),
         believed=drawn.pad,
         noise_std_N=level,
         rate_hz=rate,
@@ -208,7 +208,7 @@ def draw_case(
 
 _OVERRIDES = (
     *("law", "contact", "protocol", "rate_hz", "noise_kind", "noise_N", "position_noise_mm", "position_step_mm"),
-    *("jitter", "own_clock", "believed_jitter", "drawn", "motion"),
+    *("jitter", "own_clock", "believed_jitter", "drawn", "motion", "servo_s"),
 )
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.signal import cont2discrete, lfilter
 
 from ..laws import Law
 from ..motion import Motion
@@ -29,12 +30,14 @@ class Plant:
     motor: (t, commanded mm) → true motor side. encoder: (t, true mm) → reported, noise aside. play: (t, mm) → mm
     behind the play. felt: (t, motor side mm, mm/s, mm/s²) → N at the probe. height, gain, rate_factor: (t, behind mm)
     → mm that the surface lies deeper, factor of the elastic force, factor of the relaxation rates. sensor: order and
-    (t, N) → N, t on an even grid. `numbers` go to the kernel.
+    (t, N) → N, t on an even grid. `numbers` go to the kernel. servo_s: time constant with which the motor follows its
+    command, critically damped; 0: at once.
     """
 
     pad: Pad
     motion: Motion
     duration_s: float
+    servo_s: float = 0.0
     numbers: dict[str, Any] = field(default_factory=dict)
     motor: list[Along] = field(default_factory=list)
     encoder: list[Along] = field(default_factory=list)
@@ -84,10 +87,18 @@ def acceleration(motion: Motion, time_s: np.ndarray) -> np.ndarray:
     return np.where((time_s >= motion.breaks_s[0]) & (time_s < motion.breaks_s[-1]), value, 0.0)
 
 
+def followed(time_s: np.ndarray, values: np.ndarray, lag_s: float) -> np.ndarray:
+    """1/(τ s + 1)² of values on an even grid, linear between its points; at rest at the start."""
+    if lag_s <= 0:
+        return values
+    told = cont2discrete(([1.0], [lag_s**2, 2 * lag_s, 1.0]), float(time_s[1] - time_s[0]), method="foh")
+    return values[0] + lfilter(np.ravel(told[0]), told[1], values - values[0])
+
+
 def simulate(plant: Plant, step_s: float = STEP_S) -> Fine:
     """All stages in turn, of a virgin pad at t = 0."""
     t = np.arange(int(np.ceil(plant.duration_s / step_s)) + 2) * step_s
-    x = plant.motion.position(t)
+    x = followed(t, plant.motion.position(t), plant.servo_s)
     for stage in plant.motor:
         x = stage(t, x)
     reported = x
@@ -98,7 +109,8 @@ def simulate(plant: Plant, step_s: float = STEP_S) -> Fine:
         behind = stage(t, behind)
     felt = np.zeros_like(t)
     if plant.felt:
-        v, a = plant.motion.velocity(t), acceleration(plant.motion, t)
+        v = followed(t, plant.motion.velocity(t), plant.servo_s)
+        a = followed(t, acceleration(plant.motion, t), plant.servo_s)
         for act in plant.felt:
             felt = felt + act(t, x, v, a)
     height, gain, rate_factor = np.zeros_like(t), np.ones_like(t), np.ones_like(t)
