@@ -20,7 +20,7 @@ from .way import most_sure
 
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
-UNSEEN = 0.1  # of the noise power: what no test of structure sees of what is left, and the noise may be as well
+UNSEEN = 0.2  # of the noise power: what no test of structure sees of what is left; so far off may the noise be told
 TOLD_SIZE = 0.25  # of a cause's size, that its standard deviation may be for a sure name
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 

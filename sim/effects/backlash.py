@@ -293,6 +293,7 @@ EFFECT = Effect(
                     floor=("force_noise_N", 3.0),  # closed by less, it is another surface
                 ),
             ),
+            sought=False,
             blocks={"frame": loaded},
         ),
     ),

@@ -35,6 +35,9 @@ since the last reversal, rises with it, and is a continuous function of position
 - `smoothed`: F_c tanh(v/v_0), nothing at rest: what vibration makes of dry friction, and a film of oil (V.
   Pervozvanski, C. Canudas de Wit, Asymptotic analysis of the dither effect in systems with friction, Automatica 38,
   2002, 105–113).
+- `by_speed`: (F_c + (F_s − F_c) e^(−(v/v_s)²)) tanh(v/v_0) + viscous · v, the Stribeck curve itself: at rest there is
+  none (H. Olsson, K. J. Åström, C. Canudas de Wit, M. Gäfvert, P. Lischinsky, Friction models and friction
+  compensation, Eur. J. Control 4, 1998, 176–195, static models).
 
 State: last position, force, whether there was a position yet. A first position is rest without friction force.
 """
@@ -215,6 +218,19 @@ def smoothed(dt: float, y: float, state: State, p: State) -> float:
     return p[0] * math.tanh(moved / (dt * p[1])) if dt > 0.0 else 0.0
 
 
+@block
+def by_speed(dt: float, y: float, state: State, p: State) -> float:
+    """The Stribeck curve; p = (coulomb, static_ratio, stribeck_speed, viscous, speed)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    if dt <= 0.0:
+        return 0.0
+    v = moved / dt
+    level = p[0] * (1.0 + (p[1] - 1.0) * math.exp(-((v / p[2]) ** 2)))
+    return level * math.tanh(v / p[4]) + p[3] * v
+
+
 def _term(name: str, what: str) -> Parameter:
     return Parameter(name, "1", -1.0, 1.0, 0.0, f"{what} of the level, over `coulomb`")
 
@@ -240,6 +256,26 @@ _PRESLIDING = Parameter(
     starts=(0.001, 0.01),
 )
 
+_STATIC_RATIO = Parameter(
+    "static_ratio",
+    "1",
+    1.0,
+    3.0,
+    1.6,
+    "friction near rest over friction while sliding, F_s/F_c",
+    starts=(1.2, 2.0),
+)
+_STRIBECK_SPEED = Parameter(
+    "stribeck_speed",
+    "mm/s",
+    1e-2,
+    10.0,
+    2.0,
+    "speed at which the excess at rest has fallen to 1/e",
+    starts=(0.5, 5.0),
+)
+_VISCOUS = Parameter("viscous", "N*s/mm", 0.0, 1000.0, 0.0, "further force per speed")
+
 EFFECT = Effect(
     id="friction",
     what="Friction at the probe acts against its motion and is felt by the load cell.",
@@ -259,25 +295,9 @@ EFFECT = Effect(
             what="more to break away than to slide, and a part that grows with speed",
             parameters=(
                 _COULOMB,
-                Parameter(
-                    "static_ratio",
-                    "1",
-                    1.0,
-                    3.0,
-                    1.6,
-                    "friction near rest over friction while sliding, F_s/F_c",
-                    starts=(1.2, 2.0),
-                ),
-                Parameter(
-                    "stribeck_speed",
-                    "mm/s",
-                    1e-2,
-                    10.0,
-                    2.0,
-                    "speed at which the excess at rest has fallen to 1/e",
-                    starts=(0.5, 5.0),
-                ),
-                Parameter("viscous", "N*s/mm", 0.0, 1000.0, 0.0, "further force per speed"),
+                _STATIC_RATIO,
+                _STRIBECK_SPEED,
+                _VISCOUS,
                 _PRESLIDING,
             ),
             blocks={"probe": stribeck},
@@ -408,6 +428,19 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": one_way},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="by_speed",
+            what="by the speed alone, nothing at rest",
+            parameters=(
+                _COULOMB,
+                _STATIC_RATIO,
+                _STRIBECK_SPEED,
+                _VISCOUS,
+                Parameter("speed", "mm/s", 1e-2, 5.0, 0.1, "speed by which it is there", starts=(0.1, 1.0)),
+            ),
+            blocks={"probe": by_speed},
             state=(0.0, 0.0, 0.0),
         ),
         Form(

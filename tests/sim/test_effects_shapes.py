@@ -199,6 +199,15 @@ def test_friction_that_vibration_smooths() -> None:
     assert_allclose(force[111:], -0.3 * math.tanh(1.0), rtol=1e-9)
 
 
+def test_friction_by_the_speed_alone() -> None:
+    speeds = np.array([0.0, 0.05, 0.5, 4.0, -4.0, 0.0, -60.0])
+    x = np.concatenate([[0.3], 0.3 + np.cumsum(0.01 * speeds)])
+    told = active("friction", "by_speed", coulomb=0.2, static_ratio=1.5, stribeck_speed=2.0, viscous=1e-3, speed=0.1)
+    force = simulate(AIR, [told], 0.01 * np.arange(x.size), x)
+    level = 0.2 + 0.1 * np.exp(-((speeds / 2.0) ** 2))
+    assert_allclose(force[1:], level * np.tanh(speeds / 0.1) + 1e-3 * speeds, atol=1e-12)
+
+
 def test_cogging_of_edges_has_all_harmonics() -> None:
     x = np.arange(1000) / 1000 * 2.0
     edged = active("cogging", "edged", amplitude=0.2, period=2.0, phase=0.0, sharpness=0.5)
