@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from bench.diagnose.asked_again import NEAR
 from bench.diagnose.channel import Faults, faults, standing_off
 from bench.diagnose.data import prepare
-from bench.diagnose.diagnose import NEAR
 from bench.errors import InputError
 from bench.felt_motion import felt, resolution
 from bench.identify.problem import sized

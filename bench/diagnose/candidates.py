@@ -132,6 +132,7 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         lower, upper = 0.15 * reach.span_s, min(upper, 0.95 * reach.span_s)
         starts, default = tuple(share * reach.span_s for share in MOVED_AT[1:]), 0.5 * reach.span_s
     elif p.bend:
+        upper = min(upper, reach.depth_mm)  # beyond, it is straight all the way
         starts = tuple(share * reach.depth_mm for share in BENDS_AT)
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm

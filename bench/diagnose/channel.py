@@ -117,7 +117,7 @@ def faults(force_N: Array) -> Faults:
 def _stray_again(force: Array, outlier: Mask, stuck: Mask) -> Mask:
     """Stuck samples that say a stray value again, and samples with the one value that stray ones have where readings
     have many digits: what is read when nothing is there."""
-    first, length = _runs(force)
+    first, length = runs(force)
     return (np.repeat(outlier[first], length) & stuck) | (_one_value(force, outlier) & ~outlier)
 
 
@@ -129,7 +129,7 @@ def _one_value(force: Array, outlier: Mask) -> Mask:
     return np.zeros(len(force), dtype=bool)
 
 
-def _runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """(first sample, length) of every run of equal values."""
     first = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
     return first, np.diff(np.concatenate([first, [len(values)]]))
@@ -139,7 +139,7 @@ def _ceiling(force: Array) -> tuple[Mask, float | None]:
     """Samples at the greatest (or least) value, where many in a row share it and nothing is beyond but a few strays; or
     a few, in a channel in which no other two in a row are equal."""
     mask = np.zeros(len(force), dtype=bool)
-    first, length = _runs(force)
+    first, length = runs(force)
     span = float(np.ptp(force))
     if span == 0.0:
         return mask, None
@@ -197,7 +197,7 @@ def _yielding(force: Array) -> tuple[Mask, float | None]:
         for first, last in edges.tolist():
             core = force[first:last]
             # a value that only stays the same sticks: it is what is beside it that must be calm
-            at, long = _runs(core)
+            at, long = runs(core)
             k = int(np.argmax(long))
             begin, within = first + at[k], max(int(long[k]) - 2, 0)
             apart = np.concatenate([bend[first - 1 : begin], bend[begin + within : last - 1]])
@@ -281,9 +281,8 @@ def _slowed(force: Array, but: Mask) -> Mask:
 def _stuck(force: Array, but: Mask) -> Mask:
     """Samples that repeat the one before in runs longer than resolution and noise make them."""
     mask = np.zeros(len(force), dtype=bool)
-    first, length = _runs(force)
-    runs = length[~but[first]]
-    if len(runs) < 2:
+    first, length = runs(force)
+    if np.count_nonzero(~but[first]) < 2:
         return mask
     # how often a sample equals the one before when nothing sticks: judged where values change most
     same = np.concatenate([[0.0], (np.diff(force) == 0).astype(float)])

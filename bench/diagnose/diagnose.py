@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from bench import identify
 from bench.errors import InputError
-from bench.felt_motion import resolution
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 from sim.effects import all_effects
 from sim.model import Model
 from sim.pad import Pad
 
+from .asked_again import asked_again, with_pulses
 from .candidates import CHANNEL
-from .channel import FEW, Faults, faults, not_of_the_motion, of_the_model, resting, standing_off, strays
+from .channel import Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS, beyond_limit, of_slow_force
@@ -30,7 +30,6 @@ from .hum import find as line_of
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
-from .pulses import pulses
 from .refit import Fit, extended, force_at, mean_square, onto, placed, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
@@ -57,8 +56,6 @@ NEARLY_ALL = 0.9  # of the error beyond the noise
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
 SAME_LINE = 0.01  # of its frequency
 FADED = 0.25  # of its size as found
-NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
-STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
 SETTLED_S = 0.15  # after a move
 RIVALS = 4  # models of the best single causes that are kept
 
@@ -71,20 +68,19 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     begun = time.perf_counter()
     tell = progress or (lambda _: None)
     tell("reading the channels")
-    flags = not_of_the_motion(m, _pulsed(m, faults(m.force_N)))
+    flags = not_of_the_motion(m, with_pulses(m, faults(m.force_N)))
     prepared = prepare(m, flags.good)
     structure = believed_structure(believed, prepared)
     search = Search(prepared, structure, tell, ["saturation"] if flags.saturated.any() else [])
     tell("refitting what is believed")
     base = search.base(_pads(m, believed, structure, flags.good))
     prepared = search.prepared
-    if flags.outlier.any() or flags.unsure is not None:
-        prepared, flags, search, path = _asked_again(m, prepared, flags, search, Path([base]))
-        base = path.fits[0]
+    prepared, flags, search, path = asked_again(m, prepared, flags, search, Path([base]), first=True)
+    base = path.fits[0]
     tell("looking for causes")
     path = search.path(base)
     prepared = search.prepared
-    prepared, flags, search, path = _asked_again(m, prepared, flags, search, path)
+    prepared, flags, search, path = asked_again(m, prepared, flags, search, path)
     base = path.fits[0]
     final = ordered(prepared, reshaped(prepared.short, path.fits[-1], len(base.structure.causes)), base)
     tell("predicting what was held out")
@@ -97,16 +93,6 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
         fits, squares, excess = _dropped(prepared, fits, gone, floor)
         whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
-
-
-def _pulsed(m: Measurement, flags: Faults) -> Faults:
-    """With the pulses of a channel that has some in holds, where nothing else makes it rise at once and go back."""
-    return replace(flags, outlier=flags.outlier | _in_holds_too(m, pulses(m.force_N, ~flags.by_itself)))
-
-
-def _in_holds_too(m: Measurement, pulsed: Mask) -> Mask:
-    """Pulses of a channel that has some in holds; else none: in moves alone, the motion may have made them."""
-    return pulsed if (pulsed & resting(m)).sum() >= FEW else np.zeros_like(pulsed)
 
 
 def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple[list[Fit], list[float], list[float]]:
@@ -308,50 +294,6 @@ def _pads(m: Measurement, believed: Model, structure: Structure, good: Mask) -> 
         except (InputError, ValueError, ArithmeticError):
             pass
     return starts
-
-
-def _asked_again(
-    m: Measurement, prepared: Prepared, flags: Faults, search: Search, path: Path
-) -> tuple[Prepared, Faults, Search, Path]:
-    """Channel faults against the model found; where that changes which samples count, the fits are carried on.
-
-    Samples that stand off in moves are strays, and no transients, where the model is right about those beside them.
-    So are a few more of a channel that has strays, for transients come with most moves; and more than a few that are
-    not as the motion is.
-    """
-    fit, full, at = path.fits[-1], prepared.full, prepared.at
-    unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
-    suspect = flags.outlier | unsure
-    errors, modelled = np.full(len(m.force_N), np.nan), m.force_N.copy()
-    modelled[prepared.kept] = force_at(full, fit.structure, fit.x)[at]
-    errors[prepared.kept] = full.force_N[at] - modelled[prepared.kept]
-    known = np.isfinite(errors) & ~flags.by_itself
-    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect, resolution(m.force_N))
-    outlier &= ~of_the_model(modelled, errors, outlier)
-    pulsed = _in_holds_too(m, pulses(np.where(np.isfinite(errors), errors, 0.0), known))
-    outlier |= pulsed
-    if outlier.sum() < FEW and not suspect.any():
-        outlier &= resting(m)  # one or two in moves, in a channel without strays, are at the motion's corners
-    if np.array_equal(outlier, flags.outlier):
-        return prepared, flags, search, path
-    further, rest = outlier & ~suspect, known & ~suspect
-    few = STRAYS * len(holds(m.position_time_s, m.position_mm))
-    if (flags.outlier.any() and further.sum() <= few) or strays(m, errors, further | unsure):
-        rest &= ~further
-    rest &= ~pulsed
-    near = (NEAR * prepared.floor_N) ** 2
-    if not rest.any() or float(np.mean(errors[rest] ** 2)) > near:
-        return prepared, flags, search, path  # against a wrong model transients look like outliers
-    flags = replace(flags, outlier=outlier, unsure=None)
-    moving = known & ~resting(m)
-    beside = moving & ~outlier
-    if not beside.any() or float(np.mean(errors[beside] ** 2)) > near or not strays(m, errors, outlier & moving):
-        flags = not_of_the_motion(m, flags)
-    anew = prepare(m, flags.good).doubting(prepared.felt)
-    prepared = anew.white() if prepared.memory == 1.0 else anew
-    again = Search(prepared, search.believed, search.progress, search.known)
-    path = replace(path, fits=[onto(f, prepared.short, 15, 1e-8) for f in path.fits])
-    return prepared, flags, again, path
 
 
 def _concluded(

@@ -183,14 +183,14 @@ def _small(fit: Fit, prepared: Prepared) -> bool:
 
 
 def _own(fit: Fit, prepared: Prepared) -> bool:
-    """Whether the last cause is clear of its bounds: there it is another's limit, as a wave longer than the data is, or
-    a pull of any reach."""
+    """Whether the last cause is clear of its bounds: there it is another's limit, as a wave longer than the data is, a
+    pull of any reach, or a mode so damped that it is a lag. (Another law is one at any of its numbers.)"""
     cause = fit.structure.causes[-1]
     values = fit.structure.values(fit.x)[-1]
     if cause.id == "saturation" and not _ends(fit, prepared):
         return False
     told = [p for p in cause.form.parameters if p.required and not (p.fixed or p.amplitude)]
-    return cause.amplitude is None or all(_inside(p, values[p.name]) for p in told)
+    return cause.form.amend is not None or all(_inside(p, values[p.name]) for p in told)
 
 
 def beyond_limit(data: Data, fit: Fit) -> Mask:

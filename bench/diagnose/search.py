@@ -24,6 +24,7 @@ from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, repeatin
 
 Array = NDArray[np.float64]
 
+MANY_MORE = 2  # numbers of a shape beyond those of the plain one: then two plain causes are asked for in its place
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 AS_WELL = 0.8  # the same, of a second cause of a kind beside the first
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
@@ -144,7 +145,9 @@ class Search(Sieve):
         other = self.recurved(now) if again else now
         same = other is not now and now.chi2 - other.chi2 > SAME * (now.chi2 - best.fit.chi2)
         if turn.found.pays or same:
-            turn.ranked = self._in_shape(now, turn.ranked, len(path.fits) == 1, same)
+            shaped = self._in_shape(now, turn.ranked, len(path.fits) == 1, same)
+            if len(path.fits) > 1 or not self._two_instead(path, best, shaped[0]):
+                turn.ranked = shaped
             if same and not self._alone_clean(now.chi2, turn.ranked[0].fit.chi2, other.chi2):
                 return other
         if turn.ranked[0] is not best:
@@ -231,6 +234,18 @@ class Search(Sieve):
         rest = [*(t for t in shaped if t is not lead), *(t for t in ranked if t.id not in asked)]
         return [lead, *sorted(rest, key=lambda t: t.score)]
 
+    def _two_instead(self, path: Path, plain: Trial, shaped: Trial) -> bool:
+        """Whether a first cause in a shape of many numbers does what two plain ones do better, with fewer."""
+        if shaped.fit.free < plain.fit.free + MANY_MORE:
+            return False
+        now = path.fits[-1]
+        least = least_gain(path.fits[0], self.prepared.memory, self.samples, self.expected, False)
+        further = (t for t in self.ranked(plain.fit, least=least) if t.id != plain.id)
+        second = next((t for t in further if believable(t.fit, self.prepared)), None)
+        if second is None or second.score > shaped.score - RIVAL * self.prepared.memory:
+            return False
+        return self._clean(now.chi2, second.fit.chi2) and self.judge(plain.fit, second.fit, now).pays
+
     def _shaped(self, trial: Trial) -> Trial:
         """A trial with that one of its causes in another form of which it gains most; its own cause stays the last."""
         again = self._trial(last(self.recurved(trial.fit), trial.id))
@@ -304,8 +319,11 @@ class Search(Sieve):
     def _alone_clean(self, before: float, after: float, reshaped: float) -> bool:
         """Whether a further cause leaves nothing, and another shape of a cause found something beyond chance."""
         left = max(before - self.expected, 1e-9)
-        clean = after - self.expected < max(CLEAN * left, float(np.sqrt(2.0 * self.expected)))
-        return clean and reshaped - after > max(UNCLEAN * left, RIVAL * self.prepared.memory)
+        return self._clean(before, after) and reshaped - after > max(UNCLEAN * left, RIVAL * self.prepared.memory)
+
+    def _clean(self, before: float, after: float) -> bool:
+        """Whether a fit leaves nothing of what was left before. Both are χ²."""
+        return after - self.expected < max(CLEAN * (before - self.expected), float(np.sqrt(2.0 * self.expected)))
 
     def recurved(self, now: Fit) -> Fit:
         """The fit with one of its causes in another form, also of those that only refine others; if that is better."""
@@ -376,19 +394,22 @@ class Search(Sieve):
             without = self._without(best, index)
             if without.chi2 < best.chi2:  # it was in the way
                 return refit(self.short, without.structure, without.x, ALL, 1e-8)
+            # at a bound it is another's limit, as what came in beside it has shown
+            limit = not believable(last(best, best.structure.causes[index].id), self.prepared)
+            room = RIVAL * self.prepared.memory if limit else 0.0
             for trial in self.ranked(without, only=rivals)[:1]:
                 gained = without.chi2 - trial.fit.chi2
-                shaped = trial
-                if trial.score >= score and gained > NEARLY * (without.chi2 - best.chi2):
+                shaped, worse = trial, trial.score >= score + room
+                if worse and gained > NEARLY * (without.chi2 - best.chi2):
                     shaped = self._told(trial)
-                asked = shaped is not trial or (trial.score < score and unexplained(best.chi2, self.expected) > 0.0)
+                asked = shaped is not trial or (not worse and unexplained(best.chi2, self.expected) > 0.0)
                 if asked and not told:  # shapes against shapes
                     best, told = self.recurved(best), True
                     score = self._to_beat(best)
-                    if shaped is trial and trial.score >= score:
+                    if shaped is trial and trial.score >= score + room:
                         shaped = self._told(trial)
                 trial = shaped
-                if trial.score < score and believable(trial.fit, self.prepared):
+                if trial.score < score + room and believable(trial.fit, self.prepared):
                     best, score = trial.fit, self._to_beat(trial.fit)
         return best
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose import Diagnosis, diagnose
+from bench.diagnose.asked_again import halted
 from bench.diagnose.channel import standing_off
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
@@ -60,3 +61,21 @@ def test_noise_in_heaps_has_no_strays_and_strays_stand_off_it():
         stray = rng.choice(8000, 12, replace=False)
         left[stray] += 0.5
         assert np.array_equal(np.flatnonzero(standing_off(left, everything, none, 0.05)), np.sort(stray))
+
+
+def test_a_coarse_channel_that_stays_while_the_force_goes_on_is_stuck():
+    """At rest it says the same value for as long by itself, and no length of run tells."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        force = np.concatenate([np.full(2000, 1.0), np.linspace(1.0, 4.0, 1000), np.full(2000, 4.0)])
+        read = 0.05 * np.round((force + 0.01 * rng.standard_normal(5000)) / 0.05)
+        stuck = np.zeros(5000, dtype=bool)
+        for begin in (2100, 2400, 2800):
+            stuck[begin : begin + 80] = True
+            read[begin : begin + 80] = read[begin - 1]
+        none = np.zeros(5000, dtype=bool)
+        wrong = 0.9 * force + 0.1  # the model need not be right
+        found = halted(read, wrong, none, 0.01)
+        # the readings beside a run are of its value by chance
+        assert (found & stuck).sum() >= 0.97 * stuck.sum() and (found & ~stuck).sum() <= 0.03 * stuck.sum()
+        assert not halted(np.where(stuck, 4.4, read), wrong, none, 0.01).any()  # at its end: a ceiling

@@ -1,0 +1,111 @@
+"""Faults of the channel, asked again once there is a model: what stands off it, and what stays while it goes on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.felt_motion import resolution
+from bench.identify.motion import holds
+from bench.recording.types import Measurement
+
+from .channel import FEW, Faults, not_of_the_motion, of_the_model, resting, runs, standing_off, strays
+from .data import Prepared, prepare
+from .path import Path
+from .pulses import pulses
+from .refit import force_at, onto
+from .search import Search
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
+STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
+AGAIN = 3  # samples of one value that a force on its way does not have
+STEPS, DEVIATIONS = 2.0, 8.0  # of the channel, and of its noise: so far a force has gone that shows none of it
+
+
+def with_pulses(m: Measurement, flags: Faults) -> Faults:
+    """With the pulses of a channel that has some in holds, where nothing else makes it rise at once and go back."""
+    return replace(flags, outlier=flags.outlier | _in_holds_too(m, pulses(m.force_N, ~flags.by_itself)))
+
+
+def _in_holds_too(m: Measurement, pulsed: Mask) -> Mask:
+    """Pulses of a channel that has some in holds; else none: in moves alone, the motion may have made them."""
+    return pulsed if (pulsed & resting(m)).sum() >= FEW else np.zeros_like(pulsed)
+
+
+def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask:
+    """Samples (m,) that say the one before again, in runs in which the force has gone on. `but`: those that are known
+    to be at fault. The model need not be right.
+
+    A coarse channel repeats itself at rest, and not on its way; what is at an end of it may be at a ceiling.
+    """
+    first, length = runs(force_N)
+    far, ends = STEPS * resolution(force_N) + DEVIATIONS * noise_N, (force_N.min(), force_N.max())
+    out = np.zeros(len(force_N), dtype=bool)
+    for begin, count in zip(first[length >= AGAIN].tolist(), length[length >= AGAIN].tolist(), strict=True):
+        run = slice(begin, begin + count)
+        if float(np.ptp(modelled_N[run])) > far and force_N[begin] not in ends and not but[run].any():
+            out[begin + 1 : begin + count] = True
+    return out
+
+
+def asked_again(
+    m: Measurement, prepared: Prepared, flags: Faults, search: Search, path: Path, first: bool = False
+) -> tuple[Prepared, Faults, Search, Path]:
+    """Channel faults against the model found; where that changes which samples count, the fits are carried on. `first`:
+    the model is the belief alone, and strays are asked for only where some are known."""
+    fit, full, at = path.fits[-1], prepared.full, prepared.at
+    errors, modelled = np.full(len(m.force_N), np.nan), m.force_N.copy()
+    modelled[prepared.kept] = force_at(full, fit.structure, fit.x)[at]
+    errors[prepared.kept] = full.force_N[at] - modelled[prepared.kept]
+    stays = halted(m.force_N, modelled, flags.by_itself | ~np.isfinite(errors), prepared.noise.force_N)
+    before, flags = flags, replace(flags, stuck=flags.stuck | stays, outlier=flags.outlier & ~stays)
+    known = np.isfinite(errors) & ~flags.by_itself
+    if not first or flags.outlier.any() or flags.unsure is not None:
+        flags = _strays_again(m, prepared, flags, errors, modelled, known)
+    if flags is before or np.array_equal(flags.good, before.good):
+        return prepared, before, search, path
+    anew = prepare(m, flags.good).doubting(prepared.felt)
+    prepared = anew.white() if prepared.memory == 1.0 else anew
+    again = Search(prepared, search.believed, search.progress, search.known)
+    path = replace(path, fits=[onto(f, prepared.short, 15, 1e-8) for f in path.fits])
+    return prepared, flags, again, path
+
+
+def _strays_again(
+    m: Measurement, prepared: Prepared, flags: Faults, errors: Array, modelled: Array, known: Mask
+) -> Faults:
+    """The flags with the samples that stand off the model.
+
+    Samples that stand off in moves are strays, and no transients, where the model is right about those beside them.
+    So are a few more of a channel that has strays, for transients come with most moves; and more than a few that are
+    not as the motion is.
+    """
+    unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
+    suspect = flags.outlier | unsure
+    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect, resolution(m.force_N))
+    outlier &= ~of_the_model(modelled, errors, outlier)
+    pulsed = _in_holds_too(m, pulses(np.where(np.isfinite(errors), errors, 0.0), known))
+    outlier |= pulsed
+    if outlier.sum() < FEW and not suspect.any():
+        outlier &= resting(m)  # one or two in moves, in a channel without strays, are at the motion's corners
+    if np.array_equal(outlier, flags.outlier):
+        return flags
+    further, rest = outlier & ~suspect, known & ~suspect
+    few = STRAYS * len(holds(m.position_time_s, m.position_mm))
+    if (flags.outlier.any() and further.sum() <= few) or strays(m, errors, further | unsure):
+        rest &= ~further
+    rest &= ~pulsed
+    near = (NEAR * prepared.floor_N) ** 2
+    if not rest.any() or float(np.mean(errors[rest] ** 2)) > near:
+        return flags  # against a wrong model transients look like outliers
+    flags = replace(flags, outlier=outlier, unsure=None)
+    moving = known & ~resting(m)
+    beside = moving & ~outlier
+    if not beside.any() or float(np.mean(errors[beside] ** 2)) > near or not strays(m, errors, outlier & moving):
+        flags = not_of_the_motion(m, flags)
+    return flags
