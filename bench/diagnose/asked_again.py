@@ -44,12 +44,16 @@ def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask
     A coarse channel repeats itself at rest, and not on its way; what is at an end of it may be at a ceiling.
     """
     first, length = runs(force_N)
-    far, ends = STEPS * resolution(force_N) + DEVIATIONS * noise_N, (force_N.min(), force_N.max())
+    step_N, ends = resolution(force_N), (force_N.min(), force_N.max())
+    far = STEPS * step_N + DEVIATIONS * noise_N
     out = np.zeros(len(force_N), dtype=bool)
     for begin, count in zip(first[length >= AGAIN].tolist(), length[length >= AGAIN].tolist(), strict=True):
         run = slice(begin, begin + count)
-        if float(np.ptp(modelled_N[run])) > far and force_N[begin] not in ends and not but[run].any():
-            out[begin + 1 : begin + count] = True
+        way_N = float(np.ptp(modelled_N[run]))
+        if way_N > far and force_N[begin] not in ends and not but[run].any():
+            # on its way a force is within a step for some samples before; half of them, on the average, are of this run
+            passing = int(0.5 * count * step_N / way_N)
+            out[begin + 1 + passing : begin + count] = True
     return out
 
 
