@@ -53,6 +53,7 @@ NAMED, TRACE = 0.6, 0.05  # the same, of a further cause where what it and all o
 FAINT = 0.25  # of the noise power, that such a cause takes
 MOST = 0.5  # of what was left, that a cause leaves
 NEARLY_ALL = 0.9  # of the error beyond the noise
+UNTOLD = 2.0  # times the square that the belief leaves: then its end cannot be foretold
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
 SAME_LINE = 0.01  # of its frequency
 FADED = 0.25  # of its size as found
@@ -156,6 +157,8 @@ def _needless(
         most_left = k < 2 and gain >= MOST_LEFT * (left - slow[k]) and gain >= SPEAKS * prepared.floor_N**2
         if small and not most_left:
             return k
+    if later_square(prepared, fits[0]) > UNTOLD * squares[0]:  # what comes early does not tell the pad itself
+        return None
     later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
     if all(later <= HARM * later_square(prepared, fit) for fit in fits[:-1]):
         return None

@@ -22,6 +22,7 @@ EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
 UNSEEN = 0.2  # of the noise power: what no test of structure sees of what is left; so far off may the noise be told
 TOLD_SIZE = 0.25  # of a cause's size, that its standard deviation may be for a sure name
+HARDLY = 0.3  # sure of a name
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
 
@@ -94,8 +95,11 @@ def _square_std(prepared: Prepared, fit: Fit) -> float:
 
 
 def explains(left: float, causes: Sequence[CauseFound]) -> bool:
-    """Whether causes explain an error of which a share is left: they may leave less, the less sure they are."""
+    """Whether causes explain an error of which a share is left: they may leave less, the less sure they are; and many
+    of them, of which one is hardly sure, explain nothing."""
     sure = min((max(c.confidence, c.of_its_kind) for c in causes), default=1.0)
+    if len(causes) >= MANY and sure < HARDLY:
+        return False
     return left <= EXPLAINED * sure * (0.5 if len(causes) >= MANY else 1.0)
 
 
