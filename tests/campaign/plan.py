@@ -31,6 +31,9 @@ LARGE = 2.5
 SIZES = {"single": (0.05, 2.5), "large": (LARGE, LARGE), "pair": (0.5, 2.0), "outside": (0.5, 2.5)}
 """Log-uniform between these, times the typical size."""
 
+SERVO_S = (0.001, 0.004)
+"""Time constants of servos."""
+
 
 @dataclass(frozen=True)
 class Item:
@@ -52,8 +55,10 @@ class Item:
         return f"{self.group}/{what}/{how}/{self.seed}"
 
     def case(self) -> Case:
-        """Draw it."""
-        told = {} if self.noise is None else {"noise_kind": self.noise}
+        """Draw it. In every other one the motor follows its command late, as servos do."""
+        told: dict[str, Any] = {} if self.noise is None else {"noise_kind": self.noise}
+        rng = _stream(self.seed, "servo", "", 0)
+        told |= {"servo_s": float(rng.uniform(*SERVO_S))} if rng.random() < 0.5 else {}
         sizes, shapes = (dict(zip(self.ids, values, strict=True)) for values in (self.sizes, self.shapes))
         return draw_case(self.seed, self.ids, sizes, shapes, **told)
 
