@@ -394,9 +394,7 @@ class Search(Sieve):
             without = self._without(best, index)
             if without.chi2 < best.chi2:  # it was in the way
                 return refit(self.short, without.structure, without.x, ALL, 1e-8)
-            # at a bound it is another's limit, as what came in beside it has shown
-            limit = not believable(last(best, best.structure.causes[index].id), self.prepared)
-            room = RIVAL * self.prepared.memory if limit else 0.0
+            room = RIVAL * self.prepared.memory if self._a_limit(best, index) else 0.0
             for trial in self.ranked(without, only=rivals)[:1]:
                 gained = without.chi2 - trial.fit.chi2
                 shaped, worse = trial, trial.score >= score + room
@@ -412,6 +410,10 @@ class Search(Sieve):
                 if trial.score < score + room and believable(trial.fit, self.prepared):
                     best, score = trial.fit, self._to_beat(trial.fit)
         return best
+
+    def _a_limit(self, fit: Fit, index: int) -> bool:
+        """Whether a cause is at a bound: then it is another's limit, as what came in beside it has shown."""
+        return not believable(last(fit, fit.structure.causes[index].id), self.prepared)
 
     def _to_beat(self, fit: Fit) -> float:
         """The score below which another fit is better by more than what both leave."""

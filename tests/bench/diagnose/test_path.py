@@ -22,7 +22,8 @@ NOISE = 1000.0
 
 
 def fit(chi2: float, *ids: str) -> Any:
-    return SimpleNamespace(chi2=chi2, structure=SimpleNamespace(causes=tuple(SimpleNamespace(id=i) for i in ids)))
+    causes = tuple(SimpleNamespace(id=i) for i in ids)
+    return SimpleNamespace(chi2=chi2, structure=SimpleNamespace(causes=causes), free=len(ids))
 
 
 class Told(Search):
@@ -51,6 +52,9 @@ class Told(Search):
 
     def _felt(self, path: Any) -> None:
         """There are no data."""
+
+    def _late_by_chance(self, path: Any, fit: Any) -> bool:
+        return False
 
     def _compare(self, path: Any) -> None:
         """The same."""
@@ -238,12 +242,16 @@ class Exchanging(Told):
 
     exchanged = Search.exchanged
     believed: Any = SimpleNamespace(causes=())
+    limit = False
 
     def _without(self, now: Any, index: int) -> Any:
         return fit(50e3, *(c.id for k, c in enumerate(now.structure.causes) if k != index))
 
     def _penalty(self, now: Any) -> float:
         return 0.0
+
+    def _a_limit(self, now: Any, index: int) -> bool:
+        return self.limit
 
 
 @pytest.mark.parametrize(
@@ -260,6 +268,19 @@ def test_no_cause_goes_for_another_before_those_beside_it_have_had_their_best_sh
     path = Path([fit(200e3), fit(56e3, "force_bias"), fit(8500.0, "force_bias", "backlash")])
     path.tried = [["force_bias", "cogging"], ["backlash"]]
     assert [c.id for c in search.exchanged(path).structure.causes] == after
+
+
+@pytest.mark.parametrize(
+    ("limit", "beside", "after"),
+    [(True, 1105.0, "cogging"), (True, 1140.0, "force_bias"), (False, 1105.0, "force_bias")],
+)
+def test_a_cause_at_its_bound_gives_way_to_one_that_no_data_exclude(limit, beside, after):
+    """Within 25 of it: its limit is what the other cause is."""
+    search = Exchanging({("backlash",): {"cogging": beside}}, None)
+    search.limit = limit
+    path = Path([fit(200e3), fit(56e3, "force_bias"), fit(1100.0, "force_bias", "backlash")])
+    path.tried = [["force_bias", "cogging"], ["backlash"]]
+    assert after in {c.id for c in search.exchanged(path).structure.causes}
 
 
 @pytest.mark.parametrize(("std", "most"), [(0.02, 1.0), (0.5, 0.25), (5.0, 0.125), (float("nan"), 0.125)])

@@ -104,6 +104,14 @@ def test_two_of_a_kind_whose_numbers_are_not_the_same_stay_two():
             assert beside is None or search._united(now.fit, beside).chi2 <= now.fit.chi2
 
 
+class Expecting(Search):
+    """A search of which only what its noise comes to is known."""
+
+    @property
+    def expected(self) -> float:
+        return 1000.0
+
+
 @pytest.mark.parametrize(
     ("after", "reshaped", "alone"),
     [
@@ -114,8 +122,9 @@ def test_two_of_a_kind_whose_numbers_are_not_the_same_stay_two():
     ],
 )
 def test_a_further_cause_that_leaves_nothing_stands_against_a_shape_that_fits_worse(after, reshaped, alone):
-    judged = SimpleNamespace(expected=1000.0, prepared=SimpleNamespace(memory=1.0))
-    assert Search._alone_clean(judged, 1300.0, after, reshaped) is alone
+    judged: Any = object.__new__(Expecting)
+    judged.prepared = SimpleNamespace(memory=1.0)
+    assert judged._alone_clean(1300.0, after, reshaped) is alone
 
 
 @pytest.mark.parametrize(("form", "asked"), [("spline", True), ("power", False)])
