@@ -39,9 +39,9 @@ def test_a_form_whose_valley_is_apart_from_the_best_ones_is_found(seed):
     """From where a joint that opens has ended no way leads to one that has closed."""
     c = draw_case(seed, ("frame_compliance",), 2.5, "joint_closes", protocol="rich", rate_hz=150.0, jitter="none")
     search, base = begun(c)
-    trial = search.ranked(base, only=["frame_compliance"])[0]
-    assert trial.cause.form.name == "closing"
-    assert trial.fit.chi2 < 1.1 * search.expected
+    fit = search.path(base).fits[-1]
+    assert [cause.form.name for cause in fit.structure.causes] == ["closing"]
+    assert fit.chi2 < 1.1 * search.expected
 
 
 @pytest.mark.parametrize("seed", [1, 3, 9])
@@ -148,7 +148,7 @@ def test_a_curve_through_points_that_leaves_nothing_stands_against_its_rivals_in
 
 
 def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
-    """A polynomial is nearest while the clocks part; beside the skew an offset of one number does as well."""
+    """A curve of many numbers is nearest while the clocks part; beside the skew an offset of one does as well."""
     told = {"law": "power", "protocol": "staircase", "jitter": "none", "noise_N": 0.005, "noise_kind": "white"}
     sizes = {"clock_skew": 1.0, "contact_offset": 1.8}
     c = draw_case(
@@ -156,7 +156,7 @@ def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
     )
     search, base = begun(c)
     path = search.path(base)
-    assert path.rivals[0][0].id == "elastic_law"
+    assert path.rivals[0][0].id not in sizes
     assert {cause.id for cause in path.fits[-1].structure.causes} == set(sizes)
     for id in sizes:  # and it is beside these that a name is sure or not, and not beside the one that has gone
         stage = path.stage_of(id)
