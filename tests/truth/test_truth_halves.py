@@ -30,10 +30,6 @@ TOUCHED = [(*pair, CONTACTS[k % 2]) for k, pair in enumerate(BEYOND) if pair[1] 
 TOUCHED += [(*pair, contact) for pair in BEYOND if pair[1] in EFFECTS[pair[0]].judge for contact in CONTACTS]
 
 
-@pytest.mark.skipif(
-    not all(EFFECTS[id].judge for id in CATALOGUE),
-    reason="a new judge half is being written: of some ids there is none",
-)
 def test_the_judge_keeps_to_itself():
     least = {"third": 8, "fourth": 10, "fifth": 10, "sixth": 10, "seventh": 10, "eighth": 10, "ninth": 10, "judge": 10}
     assert all(len(outside(CATALOGUE, name)) >= count for name, count in least.items())
@@ -94,7 +90,7 @@ def test_what_is_outside_is_seen_at_its_typical_size(id, shape):
     assert np.array_equal(case.force_N, again.force_N) and np.array_equal(case.position_mm, again.position_mm)
     found, most = misfit(case), np.max(np.abs(case.truth.clean_N))
     # Seen, and no more than a disturbance.
-    assert found.detectable and 0.002 * most < found.rmse_N < 0.06 * most
+    assert found.detectable and 0.001 * most < found.rmse_N < 0.06 * most
     other = draw_case(32, (id,), 1.0, shape, drawn=case.truth.drawn, noise_N=0.01, **PLAIN)
     assert not np.allclose(other.truth.clean_N, case.truth.clean_N, atol=1e-4)
 
