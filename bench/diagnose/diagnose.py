@@ -51,6 +51,8 @@ LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and 
 DOUBTED, LITTLE = 0.3, 0.08  # sure of a name, and of the error beyond the noise: a further cause with less is none
 NAMED, TRACE = 0.6, 0.05  # the same, of a further cause where what it and all others leave is next to nothing
 FAINT = 0.25  # of the noise power, that such a cause takes
+OF_A_GIANT, NO_LESS = 0.003, 2.0  # of the error beyond the noise, and of what is left: for the shape of the first
+# cause it is little to miss, if what stands for that leaves as much of it
 MOST = 0.5  # of what was left, that a cause leaves
 NEARLY_ALL = 0.9  # of the error beyond the noise
 UNTOLD = 2.0  # times the square that the belief leaves: then its end cannot be foretold
@@ -83,7 +85,8 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     prepared = search.prepared
     prepared, flags, search, path = asked_again(m, prepared, flags, search, path)
     base = path.fits[0]
-    final = ordered(prepared, reshaped(prepared.short, path.fits[-1], len(base.structure.causes)), base)
+    final = reshaped(prepared.short, path.fits[-1], len(base.structure.causes))
+    final = ordered(prepared, final, base, path.fits)
     tell("predicting what was held out")
     floor = _floor(prepared, final)
     fits, squares, excess = _needed(prepared, path, final, floor)
@@ -91,7 +94,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     gone = _faded(fits, whole[1])
     gone = _untold(fits, whole[1], excess) if gone is None else gone
     if gone is not None:
-        fits, squares, excess = _dropped(prepared, fits, gone, floor)
+        fits, squares, excess = _dropped(prepared, path, fits, gone, floor)
         whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
 
@@ -107,26 +110,28 @@ def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple
         number = _needless(prepared, fits, squares, excess, apart, slow)
         return _doubtful(path, fits, excess, apart, floor_N, slow) if number is None else number
 
-    fits = chain(prepared, final, base)
+    fits = chain(prepared, final, base, path.fits)
     squares, excess = excesses(prepared, fits, floor_N)
     shapes, as_found = ({(c.id, c.form.name) for c in fit.structure.causes} for fit in (final, plain))
     untried = shapes != as_found
     while len(fits) > 1 and (number := needless(fits, squares, excess)) is not None:
         if untried:  # it may be the shape that does harm, and not the cause
-            untried, others = False, chain(prepared, ordered(prepared, plain, base), base)
+            untried, others = False, chain(prepared, ordered(prepared, plain, base), base, path.fits)
             of_them = excesses(prepared, others, floor_N)
             if needless(others, *of_them) is None:
                 return others, *of_them
-        fits, squares, excess = _dropped(prepared, fits, number, floor_N)
+        fits, squares, excess = _dropped(prepared, path, fits, number, floor_N)
     return fits, squares, excess
 
 
 def _dropped(
-    prepared: Prepared, fits: list[Fit], number: int, floor_N: float
+    prepared: Prepared, path: Path, fits: list[Fit], number: int, floor_N: float
 ) -> tuple[list[Fit], list[float], list[float]]:
-    """The chain without one of the causes found, with its held-out squares and excesses."""
+    """The chain without one of the causes found, with its held-out squares and excesses. What the others take may have
+    another order then."""
     base = fits[0]
-    fits = chain(prepared, without(prepared, fits[-1], len(base.structure.causes) + number), base)
+    left = without(prepared, fits[-1], len(base.structure.causes) + number, path.fits)
+    fits = chain(prepared, ordered(prepared, left, base, path.fits), base, path.fits)
     return fits, *excesses(prepared, fits, floor_N)
 
 
@@ -190,6 +195,8 @@ def _doubtful(
             return k - 1
         taken, trace = excess[k - 1] - excess[k], TRACE * excess[0]
         if sure < NAMED and taken < min(trace, FAINT * floor_N**2) and taken + excess[-1] < 2.0 * trace:
+            return k - 1
+        if sure < DOUBTED and taken < min(OF_A_GIANT * excess[0], NO_LESS * excess[-1]):
             return k - 1
     return None
 

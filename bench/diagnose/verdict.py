@@ -26,16 +26,15 @@ HARDLY = 0.3  # sure of a name
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
 
-def ordered(prepared: Prepared, fit: Fit, base: Fit) -> Fit:
-    """The causes in the order of what leaving each one out would cost."""
+def ordered(prepared: Prepared, fit: Fit, base: Fit, known: Sequence[Fit] = ()) -> Fit:
+    """The causes in the order of what leaving each one out would cost. `known`: as in `without`."""
     own = len(base.structure.causes)
     number = len(fit.structure.causes)
     if number - own < 2:
         return fit
     costs = []
     for index in range(own, number):
-        structure, x = reduced(fit, index)
-        costs.append(refit(prepared.short, structure, x, 15, 1e-6).chi2)
+        costs.append(without(prepared, fit, index, known, 15).chi2)
     order = list(range(own)) + [own + int(k) for k in np.argsort(-np.array(costs), kind="stable")]
     structure = replace(fit.structure, causes=tuple(fit.structure.causes[i] for i in order))
     values = fit.structure.values(fit.x)
@@ -43,18 +42,22 @@ def ordered(prepared: Prepared, fit: Fit, base: Fit) -> Fit:
     return refit(prepared.short, structure, structure.x(pad, [values[i] for i in order], fit.of_run), 8, 1e-8)
 
 
-def without(prepared: Prepared, fit: Fit, index: int) -> Fit:
-    """The fit without one of its causes."""
+def without(prepared: Prepared, fit: Fit, index: int, known: Sequence[Fit] = (), steps: int = 30) -> Fit:
+    """The fit without one of its causes. `known`: fits of before: from one of the same causes in the same shapes it may
+    be better, for what stood beside a cause can have led it far from where it is alone."""
     structure, x = reduced(fit, index)
-    return refit(prepared.short, structure, x, 30, 1e-8)
+    shapes = [(c.id, c.form.name) for c in structure.causes]
+    begun = [(structure, x)]
+    begun += [(f.structure, f.x) for f in known if [(c.id, c.form.name) for c in f.structure.causes] == shapes]
+    return min((refit(prepared.short, s, at, steps, 1e-8) for s, at in begun), key=lambda f: f.chi2)
 
 
-def chain(prepared: Prepared, fit: Fit, base: Fit) -> list[Fit]:
-    """Fits of the believed structure, with the first cause, with two …, up to all."""
+def chain(prepared: Prepared, fit: Fit, base: Fit, known: Sequence[Fit] = ()) -> list[Fit]:
+    """Fits of the believed structure, with the first cause, with two …, up to all. `known`: as in `without`."""
     own = len(base.structure.causes)
     fits = [fit]
     while len(fits[-1].structure.causes) > own + 1:
-        fits.append(without(prepared, fits[-1], len(fits[-1].structure.causes) - 1))
+        fits.append(without(prepared, fits[-1], len(fits[-1].structure.causes) - 1, known))
     return [base, *reversed(fits)] if len(fit.structure.causes) > own else [base]
 
 

@@ -105,14 +105,16 @@ def test_where_the_shape_does_harm_the_cause_stays_as_it_was_found(monkeypatch, 
         asked.append(names(fits))
         return 0 if harmful & set(names(fits)) else None
 
-    monkeypatch.setattr(module, "chain", lambda prepared, fit, base: [base, fit] if fit.structure.causes else [base])
+    monkeypatch.setattr(
+        module, "chain", lambda prepared, fit, base, known: [base, fit] if fit.structure.causes else [base]
+    )
     monkeypatch.setattr(module, "ordered", lambda prepared, fit, base: fit)
     monkeypatch.setattr(module, "excesses", lambda prepared, fits, floor: ([1.0] * len(fits), [1.0] * len(fits)))
     monkeypatch.setattr(module, "_slow_squares", lambda *_: [0.0])
     monkeypatch.setattr(module, "_flagged_square", lambda *_: 0.0)
     monkeypatch.setattr(module, "_needless", asked_of)
     monkeypatch.setattr(module, "_doubtful", lambda *_: None)
-    monkeypatch.setattr(module, "_dropped", lambda prepared, fits, number, floor: ([base], [1.0], [1.0]))
+    monkeypatch.setattr(module, "_dropped", lambda prepared, path, fits, number, floor: ([base], [1.0], [1.0]))
     path: Any = SimpleNamespace(fits=[base, plain])
     prepared: Any = SimpleNamespace()
     fits, _, _ = module._needed(prepared, path, final, 1.0)

@@ -203,6 +203,10 @@ def test_where_no_test_sees_structure_a_little_over_the_noise_is_noise():
         ([400.0, 3.0, 0.0], 0.4, None),  # more than the noise
         ([400.0, 0.3, 0.0], 0.4, None),  # far more than a crumb of it
         ([400.0, 0.2, 0.0], 0.4, 1),
+        ([9500.0, 28.0, 10.0], 0.2, 1),  # what the shape of a giant misses
+        ([9500.0, 28.0, 10.0], 0.4, None),  # the name may be right
+        ([9500.0, 28.0, 5.0], 0.2, None),  # it leaves little of that
+        ([4000.0, 28.0, 10.0], 0.2, None),  # it is no giant's
     ],
 )
 def test_a_further_cause_that_takes_next_to_nothing_under_an_unsure_name_goes(monkeypatch, excess, sure, goes):
