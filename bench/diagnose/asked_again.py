@@ -24,6 +24,7 @@ Mask = NDArray[np.bool_]
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
 AGAIN = 3  # samples of one value that a force on its way does not have
+JUMP = 0.5  # of the way a force has gone while its channel stayed
 STEPS, DEVIATIONS = 2.0, 8.0  # of the channel, and of its noise: so far a force has gone that shows none of it
 
 
@@ -39,7 +40,8 @@ def _in_holds_too(m: Measurement, pulsed: Mask) -> Mask:
 
 def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask:
     """Samples (m,) that say the one before again, in runs in which the force has gone on. `but`: those that are known
-    to be at fault. The model need not be right.
+    to be at fault. The model need not be right: where a force goes on less than it says, it does so afterwards too, but
+    a channel that stayed jumps to where the force has gone.
 
     A coarse channel repeats itself at rest, and not on its way; what is at an end of it may be at a ceiling.
     """
@@ -50,7 +52,9 @@ def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask
     for begin, count in zip(first[length >= AGAIN].tolist(), length[length >= AGAIN].tolist(), strict=True):
         run = slice(begin, begin + count)
         way_N = float(np.ptp(modelled_N[run]))
-        if way_N > far and force_N[begin] not in ends and not but[run].any():
+        jump_N = float(abs(force_N[min(begin + count, len(force_N) - 1)] - force_N[begin]))
+        jumps = jump_N > max(JUMP * way_N, step_N + 0.5 * DEVIATIONS * noise_N)
+        if way_N > far and jumps and force_N[begin] not in ends and not but[run].any():
             # on its way a force is within a step for some samples before; half of them, on the average, are of this run
             passing = int(0.5 * count * step_N / way_N)
             out[begin + 1 + passing : begin + count] = True

@@ -79,3 +79,13 @@ def test_a_coarse_channel_that_stays_while_the_force_goes_on_is_stuck():
         # the readings beside a run are of its value by chance
         assert (found & stuck).sum() >= 0.9 * stuck.sum() and (found & ~stuck).sum() <= 0.05 * stuck.sum()
         assert not halted(np.where(stuck, 4.4, read), wrong, none, 0.01).any()  # at its end: a ceiling
+
+
+def test_a_force_that_goes_slower_than_the_model_says_is_not_stuck():
+    """A step of a coarse channel takes long then, and nothing jumps at its end."""
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        force = np.concatenate([np.full(2000, 1.0), np.linspace(1.0, 1.6, 1000), np.full(2000, 1.6)])
+        read = 0.05 * np.round((force + 0.005 * rng.standard_normal(5000)) / 0.05)
+        far_off = 1.0 + 10.0 * (force - 1.0)
+        assert not halted(read, far_off, np.zeros(5000, dtype=bool), 0.005).any()
