@@ -107,7 +107,7 @@ def _strays_again(
     few = STRAYS * len(holds(m.position_time_s, m.position_mm))
     if (flags.outlier.any() and further.sum() <= few) or strays(m, errors, further | unsure):
         rest &= ~further
-    rest &= ~pulsed
+    rest &= ~(pulsed | further & resting(m))  # what stands off alone in a hold is no transient, whatever the model is
     near = (NEAR * prepared.floor_N) ** 2
     if not rest.any() or float(np.mean(errors[rest] ** 2)) > near:
         return flags  # against a wrong model transients look like outliers
