@@ -29,10 +29,8 @@ APART = 10  # samples of rest between two moves, one of which would else be in t
 FASTEST = 12  # moves: slow ones hardly show how they begin
 SMOOTHED_S = (0.3e-3, 0.7e-3, 1.5e-3, 3e-3, 6e-3, 12e-3)  # standard deviations of smoothing that are tried first
 FASTER, STARTED = (1.0, 1.5, 3.0), 2  # times the acceleration of plain trapezoids; the best of these that are begun at
-FEWER, SOME = (
-    0.95,
-    0.15,
-)  # of the cost without, that smoothing must leave at the most; of the moves, that it must explain
+FEWER = 0.95  # of the cost without, that smoothing must leave at the most
+SOME = 0.15  # of the moves, that it must explain
 
 
 @dataclass

@@ -95,9 +95,9 @@ def planned_moves(
             if groups:
                 back = 4.0 * noise_mm
                 if not asked:
-                    asked, shape = (
-                        True,
-                        smoothed_shape(time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, resting, back),
+                    asked = True
+                    shape = smoothed_shape(
+                        time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, resting, back
                     )
                 found = fitted_moves(
                     time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, ALL, resting, back, shape

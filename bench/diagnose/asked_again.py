@@ -30,12 +30,12 @@ STEPS, DEVIATIONS = 2.0, 8.0  # of the channel, and of its noise: so far a force
 
 def with_pulses(m: Measurement, flags: Faults) -> Faults:
     """With the pulses of a channel that has some in holds, where nothing else makes it rise at once and go back."""
-    return replace(flags, outlier=flags.outlier | _in_holds_too(m, pulses(m.force_N, ~flags.by_itself)))
+    return replace(flags, outlier=flags.outlier | _in_holds_too(resting(m), pulses(m.force_N, ~flags.by_itself)))
 
 
-def _in_holds_too(m: Measurement, pulsed: Mask) -> Mask:
+def _in_holds_too(at_rest: Mask, pulsed: Mask) -> Mask:
     """Pulses of a channel that has some in holds; else none: in moves alone, the motion may have made them."""
-    return pulsed if (pulsed & resting(m)).sum() >= FEW else np.zeros_like(pulsed)
+    return pulsed if (pulsed & at_rest).sum() >= FEW else np.zeros_like(pulsed)
 
 
 def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask:
@@ -53,8 +53,7 @@ def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask
         run = slice(begin, begin + count)
         way_N = float(np.ptp(modelled_N[run]))
         jump_N = float(abs(force_N[min(begin + count, len(force_N) - 1)] - force_N[begin]))
-        jumps = jump_N > max(JUMP * way_N, step_N + 0.5 * DEVIATIONS * noise_N)
-        if way_N > far and jumps and force_N[begin] not in ends and not but[run].any():
+        if way_N > far and jump_N > JUMP * way_N and force_N[begin] not in ends and not but[run].any():
             # on its way a force is within a step for some samples before; half of them, on the average, are of this run
             passing = int(0.5 * count * step_N / way_N)
             out[begin + 1 + passing : begin + count] = True
@@ -75,7 +74,7 @@ def asked_again(
     known = np.isfinite(errors) & ~flags.by_itself
     if not first or flags.outlier.any() or flags.unsure is not None:
         flags = _strays_again(m, prepared, flags, errors, modelled, known)
-    if flags is before or np.array_equal(flags.good, before.good):
+    if np.array_equal(flags.good, before.good):
         return prepared, before, search, path
     anew = prepare(m, flags.good).doubting(prepared.felt)
     prepared = anew.white() if prepared.memory == 1.0 else anew
@@ -94,25 +93,26 @@ def _strays_again(
     not as the motion is.
     """
     unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
-    suspect = flags.outlier | unsure
-    outlier = standing_off(np.where(np.isfinite(errors), errors, 0.0), known, suspect, resolution(m.force_N))
+    suspect, at_rest = flags.outlier | unsure, resting(m)
+    told = np.where(np.isfinite(errors), errors, 0.0)
+    outlier = standing_off(told, known, suspect, resolution(m.force_N))
     outlier &= ~of_the_model(modelled, errors, outlier)
-    pulsed = _in_holds_too(m, pulses(np.where(np.isfinite(errors), errors, 0.0), known))
+    pulsed = _in_holds_too(at_rest, pulses(told, known))
     outlier |= pulsed
     if outlier.sum() < FEW and not suspect.any():
-        outlier &= resting(m)  # one or two in moves, in a channel without strays, are at the motion's corners
+        outlier &= at_rest  # one or two in moves, in a channel without strays, are at the motion's corners
     if np.array_equal(outlier, flags.outlier):
         return flags
     further, rest = outlier & ~suspect, known & ~suspect
     few = STRAYS * len(holds(m.position_time_s, m.position_mm))
     if (flags.outlier.any() and further.sum() <= few) or strays(m, errors, further | unsure):
         rest &= ~further
-    rest &= ~(pulsed | further & resting(m))  # what stands off alone in a hold is no transient, whatever the model is
+    rest &= ~(pulsed | further & at_rest)  # what stands off alone in a hold is no transient, whatever the model is
     near = (NEAR * prepared.floor_N) ** 2
     if not rest.any() or float(np.mean(errors[rest] ** 2)) > near:
         return flags  # against a wrong model transients look like outliers
     flags = replace(flags, outlier=outlier, unsure=None)
-    moving = known & ~resting(m)
+    moving = known & ~at_rest
     beside = moving & ~outlier
     if not beside.any() or float(np.mean(errors[beside] ** 2)) > near or not strays(m, errors, outlier & moving):
         flags = not_of_the_motion(m, flags)
