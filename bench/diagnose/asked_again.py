@@ -95,7 +95,8 @@ def _strays_again(
     unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
     suspect, at_rest = flags.outlier | unsure, resting(m)
     told = np.where(np.isfinite(errors), errors, 0.0)
-    outlier = standing_off(told, known, suspect, resolution(m.force_N))
+    step_N = resolution(m.force_N)
+    outlier = standing_off(told, known, suspect, step_N)
     outlier &= ~of_the_model(modelled, errors, outlier)
     pulsed = _in_holds_too(at_rest, pulses(told, known))
     outlier |= pulsed
@@ -107,6 +108,9 @@ def _strays_again(
     few = STRAYS * len(holds(m.position_time_s, m.position_mm))
     if (flags.outlier.any() and further.sum() <= few) or strays(m, errors, further | unsure):
         rest &= ~further
+    if strays(m, errors, outlier & ~at_rest):  # where they crowd, some show only once the others are gone
+        outlier |= (crowded := standing_off(told, known & ~outlier, suspect, step_N))
+        rest &= ~crowded
     rest &= ~(pulsed | further & at_rest)  # what stands off alone in a hold is no transient, whatever the model is
     near = (NEAR * prepared.floor_N) ** 2
     if not rest.any() or float(np.mean(errors[rest] ** 2)) > near:

@@ -50,6 +50,7 @@ DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
 FALSE_SHARE, SEVERAL = 0.02, 10  # of values beyond the limit that may be noise, where at least so many lie there
 AROUND_S = 0.02  # either side of a sample, where its speed and acceleration are looked at
 TOGETHER, ONE_WAY = 0.5, 0.5  # of strays, that have another beside them, or go with the motion: fewer do
+BY_CHANCE = 2.5  # deviations of how often neighbours that stand off agree in sign, by chance
 MOSTLY = 0.5  # of the samples that stand off
 RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data
 
@@ -449,4 +450,15 @@ def strays(m: Measurement, errors: Array, off: Mask) -> bool:
     with_speed, with_acceleration = (
         abs(float(np.mean(sign * np.sign(way)))) for way in (x[2] - x[0], x[2] - 2.0 * x[1] + x[0])
     )
-    return float(np.mean(beside)) < TOGETHER and max(with_speed, with_acceleration) < ONE_WAY
+    apart = float(np.mean(beside)) < TOGETHER or _as_it_comes(np.sign(errors) * off)
+    return apart and max(with_speed, with_acceleration) < ONE_WAY
+
+
+def _as_it_comes(sign: Array) -> bool:
+    """Whether of samples (m,) that stand off (0: does not) neighbours, and next neighbours, agree in sign about as
+    often as not: what lasts keeps its sign, and what rings turns it in one of the two."""
+    products = [sign[lag:] * sign[:-lag] for lag in (1, 2)]
+    counts = [int(np.count_nonzero(p)) for p in products]
+    return all(
+        n >= SEVERAL and abs(float(p.sum())) < BY_CHANCE * np.sqrt(n) for p, n in zip(products, counts, strict=True)
+    )

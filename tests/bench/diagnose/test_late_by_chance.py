@@ -49,6 +49,7 @@ def test_what_is_late_by_a_rule_or_not_at_all_does_not_scatter(id: str) -> None:
         assert told_s(case, "force_delay", delay=0.003) == 0.0
 
 
+@pytest.mark.long
 def test_a_delay_that_scatters_is_explained_with_its_noise() -> None:
     said = []
     for seed in SEEDS[:3]:

@@ -30,6 +30,7 @@ def example() -> Outcome:
 
 
 @measured
+@pytest.mark.long
 def test_the_worked_example_gains_on_data_held_out(example: Outcome) -> None:
     assert example.diagnosis is not None and example.diagnosis.verdict == "explained"
     assert example.gain >= 0.3
@@ -40,6 +41,7 @@ def test_the_worked_example_gains_on_data_held_out(example: Outcome) -> None:
 
 
 @measured
+@pytest.mark.long
 def test_the_worked_example_finds_the_friction_of_its_strokes(example: Outcome) -> None:
     assert example.diagnosis is not None
     friction = next(c for c in example.diagnosis.causes if c.id == "friction")

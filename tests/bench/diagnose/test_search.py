@@ -147,6 +147,7 @@ def test_a_curve_through_points_that_leaves_nothing_stands_against_its_rivals_in
     assert Search._in_shape(begun, now, [law, wave], True, False)[0].id == ("encoder_error" if asked else law.id)
 
 
+@pytest.mark.long
 def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
     """A curve of many numbers is nearest while the clocks part; beside the skew an offset of one does as well."""
     told = {"law": "power", "protocol": "staircase", "jitter": "none", "noise_N": 0.005, "noise_kind": "white"}

@@ -137,6 +137,7 @@ SHAPES_OF_OTHERS = [  # (cause, shape of the truth, nearest of the family's, num
 ]
 
 
+@pytest.mark.long
 def test_numbers_of_a_shape_that_is_none_of_the_familys_are_as_sure_as_is_stated() -> None:
     """Of the numbers of fifteen cases hardly one in three is off by more than two of the deviations stated, though most
     are by the noise's alone; and four in five are still told to a quarter."""

@@ -8,7 +8,8 @@ import pytest
 
 from bench.diagnose import Diagnosis, diagnose
 from bench.diagnose.asked_again import halted
-from bench.diagnose.channel import standing_off
+from bench.diagnose.channel import standing_off, strays
+from bench.recording.types import Measurement
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
 from tests.truth.cases import Case, draw_case
@@ -61,6 +62,23 @@ def test_noise_in_heaps_has_no_strays_and_strays_stand_off_it():
         stray = rng.choice(8000, 12, replace=False)
         left[stray] += 0.5
         assert np.array_equal(np.flatnonzero(standing_off(left, everything, none, 0.05)), np.sort(stray))
+
+
+def test_strays_that_crowd_are_told_from_what_rings():
+    """Every second sample within 20 ms of a start or a stop, up or down as it comes; or a mode that is struck there."""
+    time = np.arange(0.0, 20.0, 0.001)
+    position = np.interp(time % 1.0, [0.0, 0.3, 0.5, 0.8], [0.0, 0.0, 1.0, 1.0])
+    m = Measurement("crowd", time, position, time, np.zeros_like(time))
+    since = np.minimum((time - 0.3) % 1.0, (time - 0.5) % 1.0)
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        off = (since < 0.02) & (rng.random(len(time)) < 0.6)
+        stray = np.where(off, rng.choice([-1.0, 1.0], len(time)) * rng.uniform(1.0, 2.0, len(time)), 0.0)
+        assert strays(m, stray, off)
+        for frequency_Hz in rng.uniform(20.0, 490.0, 5):
+            struck = np.repeat(rng.choice([-1.0, 1.0], 40), 500)
+            rung = struck * np.cos(2.0 * np.pi * frequency_Hz * since + 0.3)
+            assert not strays(m, rung, since < 0.02), frequency_Hz
 
 
 def test_a_coarse_channel_that_stays_while_the_force_goes_on_is_stuck():
