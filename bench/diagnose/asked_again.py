@@ -15,7 +15,7 @@ from .channel import FEW, Faults, not_of_the_motion, of_the_model, resting, runs
 from .data import Prepared, prepare
 from .path import Path
 from .pulses import pulses
-from .refit import force_at, onto
+from .refit import Fit, force_at, onto
 from .search import Search
 
 Array = NDArray[np.float64]
@@ -60,15 +60,31 @@ def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask
     return out
 
 
+def _left(m: Measurement, prepared: Prepared, fit: Fit) -> tuple[Array, Array]:
+    """What a fit leaves of each force sample (m,), nan where that was not fitted; and its force there, N."""
+    full, at = prepared.full, prepared.at
+    errors, modelled = np.full(len(m.force_N), np.nan), m.force_N.copy()
+    modelled[prepared.kept] = force_at(full, fit.structure, fit.x)[at]
+    errors[prepared.kept] = full.force_N[at] - modelled[prepared.kept]
+    return errors, modelled
+
+
+def _let_go(m: Measurement, prepared: Prepared, flags: Faults, fit: Fit) -> Fit:
+    """A fit without samples that are strays for all that it can tell: many have pulled it away from the rest."""
+    errors = _left(m, prepared, fit)[0]
+    known = np.isfinite(errors) & flags.good
+    off = standing_off(np.where(known, errors, 0.0), known, _unsure(flags), resolution(m.force_N))
+    if not strays(m, errors, off):
+        return fit
+    return onto(fit, prepare(m, flags.good & ~off).doubting(prepared.felt).short, 15, 1e-8)
+
+
 def asked_again(
     m: Measurement, prepared: Prepared, flags: Faults, search: Search, path: Path, first: bool = False
 ) -> tuple[Prepared, Faults, Search, Path]:
     """Channel faults against the model found; where that changes which samples count, the fits are carried on. `first`:
     the model is the belief alone, and strays are asked for only where some are known."""
-    fit, full, at = path.fits[-1], prepared.full, prepared.at
-    errors, modelled = np.full(len(m.force_N), np.nan), m.force_N.copy()
-    modelled[prepared.kept] = force_at(full, fit.structure, fit.x)[at]
-    errors[prepared.kept] = full.force_N[at] - modelled[prepared.kept]
+    errors, modelled = _left(m, prepared, _let_go(m, prepared, flags, path.fits[-1]))
     stays = halted(m.force_N, modelled, flags.by_itself | ~np.isfinite(errors), prepared.noise.force_N)
     before, flags = flags, replace(flags, stuck=flags.stuck | stays, outlier=flags.outlier & ~stays)
     known = np.isfinite(errors) & ~flags.by_itself
@@ -83,6 +99,11 @@ def asked_again(
     return prepared, flags, again, path
 
 
+def _unsure(flags: Faults) -> Mask:
+    """Samples that stand off in moves, and may be strays."""
+    return np.zeros_like(flags.outlier) if flags.unsure is None else flags.unsure
+
+
 def _strays_again(
     m: Measurement, prepared: Prepared, flags: Faults, errors: Array, modelled: Array, known: Mask
 ) -> Faults:
@@ -92,7 +113,7 @@ def _strays_again(
     So are a few more of a channel that has strays, for transients come with most moves; and more than a few that are
     not as the motion is.
     """
-    unsure = np.zeros(len(m.force_N), dtype=bool) if flags.unsure is None else flags.unsure
+    unsure = _unsure(flags)
     suspect, at_rest = flags.outlier | unsure, resting(m)
     told = np.where(np.isfinite(errors), errors, 0.0)
     step_N = resolution(m.force_N)

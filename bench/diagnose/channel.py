@@ -457,8 +457,6 @@ def strays(m: Measurement, errors: Array, off: Mask) -> bool:
 def _as_it_comes(sign: Array) -> bool:
     """Whether of samples (m,) that stand off (0: does not) neighbours, and next neighbours, agree in sign about as
     often as not: what lasts keeps its sign, and what rings turns it in one of the two."""
-    products = [sign[lag:] * sign[:-lag] for lag in (1, 2)]
-    counts = [int(np.count_nonzero(p)) for p in products]
-    return all(
-        n >= SEVERAL and abs(float(p.sum())) < BY_CHANCE * np.sqrt(n) for p, n in zip(products, counts, strict=True)
-    )
+    next_, over_next = (sign[lag:] * sign[:-lag] for lag in (1, 2))
+    told = [(int(np.count_nonzero(both)), abs(float(both.sum()))) for both in (next_, over_next)]
+    return told[0][0] >= SEVERAL and all(total <= BY_CHANCE * np.sqrt(count) for count, total in told)
