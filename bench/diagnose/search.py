@@ -150,6 +150,8 @@ class Search(Sieve):
                 turn.ranked = shaped
             if same and not self._alone_clean(now.chi2, turn.ranked[0].fit.chi2, other.chi2):
                 return other
+        if turn.found.pays and len(path.fits) == 1:
+            turn.ranked = self._plain_first(path, turn.ranked)
         if turn.ranked[0] is not best:
             best = turn.ranked[0]
             turn.found = self._lead(path, best)
@@ -245,6 +247,18 @@ class Search(Sieve):
         if second is None or second.score > shaped.score - RIVAL * self.prepared.memory:
             return False
         return self._clean(now.chi2, second.fit.chi2) and self.judge(plain.fit, second.fit, now).pays
+
+    def _plain_first(self, path: Path, ranked: list[Trial]) -> list[Trial]:
+        """The candidates for a first cause, with one of few numbers in front of a curve of many that is half-way to
+        everything, where that one and a second leave nothing."""
+        lead = ranked[0]
+        if unexplained(lead.fit.chi2, self.expected) <= 0.0:
+            return ranked
+        near = [t for t in ranked[1:] if t.id in self._near(path.fits[-1], ranked)]
+        plain = next((t for t in near if t.fit.free + MANY_MORE < lead.fit.free), None)
+        if plain is None or not self._two_instead(path, plain, self._told(lead)):
+            return ranked
+        return [plain, *(t for t in ranked if t is not plain)]
 
     def _shaped(self, trial: Trial) -> Trial:
         """A trial with that one of its causes in another form of which it gains most; its own cause stays the last."""
