@@ -191,3 +191,33 @@ def test_a_softening_that_bends_at_a_depth_is_found_wherever_that_is(seed):
     trial = search.ranked(base, only=["stress_softening"])[0]
     assert trial.cause.form.name == "linear"
     assert trial.fit.chi2 < 1.1 * search.expected
+
+
+@pytest.mark.parametrize(
+    ("leaves", "free", "left", "first"),
+    [
+        (3000.0, 6, 1010.0, "force_bias"),  # with a second it leaves nothing
+        (3000.0, 6, 2900.0, "cogging"),  # what both leave may be of another shape of the curve
+        (1000.0, 6, 1010.0, "cogging"),  # nothing is left to ask about
+        (3000.0, 2, 1010.0, "cogging"),  # no curve of many numbers
+    ],
+)
+def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_of_many(leaves, free, left, first):
+    before: Any = SimpleNamespace(chi2=20000.0, free=5)
+
+    def trial(id: str, chi2: float, free: int) -> Any:
+        return SimpleNamespace(id=id, fit=SimpleNamespace(chi2=chi2, free=5 + free), score=chi2)
+
+    curve, plain = trial("cogging", leaves, free), trial("force_bias", 5000.0, 1)
+    second = trial("encoder_error", left, 4)
+    asked: Any = object.__new__(Expecting)
+    asked.prepared, asked.samples = SimpleNamespace(memory=1.0), 10000
+    asked._near = lambda now, ranked: ["force_bias"]
+    asked._told = lambda t: t
+    asked.ranked = lambda fit, least: [second] if fit is plain.fit else []
+    asked.judge = lambda *_: SimpleNamespace(pays=True)
+    path: Any = SimpleNamespace(fits=[before])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("bench.diagnose.search.believable", lambda *_: True)
+        patch.setattr("bench.diagnose.search.least_gain", lambda *_: 0.0)
+        assert asked._plain_first(path, [curve, plain])[0].id == first
