@@ -113,9 +113,9 @@ def profile(
     """Way gone at τ from a trapezoid's middle, its derivatives by the middle's time and by the speed."""
     if smoothing != PLAIN:
         return _smoothed(tau, way, speed, acceleration, smoothing)
-    half, late = (way / speed + speed / acceleration) / 2, np.abs(tau)
-    left = np.maximum(half - late, 0.0)  # until it stands
-    cruising = late <= (way / speed - speed / acceleration) / 2
+    (long, short), late = _corners(way, speed, acceleration), np.abs(tau)
+    left = np.maximum(long - late, 0.0)  # until it stands
+    cruising = late < short
     rise = np.where(cruising, speed * late, way / 2 - acceleration / 2 * left**2)
     slope = np.where(cruising, speed, acceleration * left)
     by_half = (-way / speed**2 + 1 / acceleration) / 2

@@ -131,13 +131,9 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     elif p.name == "bends_at":  # a rate that is another one but for a moment at the begin is a step
         lower, upper = 0.15 * reach.span_s, min(upper, 0.95 * reach.span_s)
         starts, default = tuple(share * reach.span_s for share in MOVED_AT[1:]), 0.5 * reach.span_s
-    elif p.name == "depth":  # of what goes over a longer way only the slope is told
-        upper = min(upper, (0.5 if p.bend else 1.0) * reach.depth_mm)
-        if p.bend:
-            starts = tuple(share * reach.depth_mm for share in BENDS_AT)
-    elif p.bend:
-        upper = min(upper, reach.depth_mm)
-        starts = tuple(share * reach.depth_mm for share in BENDS_AT)
+    elif p.bend or p.name == "depth":  # of what goes over a longer way only the slope is told
+        upper = min(upper, (0.5 if p.bend and p.name == "depth" else 1.0) * reach.depth_mm)
+        starts = tuple(share * reach.depth_mm for share in BENDS_AT) if p.bend else starts
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm
     elif p.name == "at_swing":
