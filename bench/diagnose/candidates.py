@@ -237,7 +237,8 @@ class Signatures:
         """(χ² that the cause's signature takes, amplitude at which it does); amplitude within the bounds."""
         amplitude, column = cause.amplitude, self.column(cause)
         assert amplitude is not None
-        square = float(np.sum(column * column))
+        with np.errstate(over="ignore"):  # of numbers that make no plant
+            square = float(np.sum(column * column))
         if not np.isfinite(square) or square <= 1e-18:
             return 0.0, 0.0
         along = float(np.sum(column * self.residual))
