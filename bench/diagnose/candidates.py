@@ -252,7 +252,8 @@ class Signatures:
         if not np.isfinite(change).all():
             return -np.inf
         column = self._clear(self.data.whitened(change))
-        return float(2.0 * np.sum(column * self.residual) - np.sum(column * column))
+        with np.errstate(over="ignore"):
+            return float(2.0 * np.sum(column * self.residual) - np.sum(column * column))
 
 
 def combinations(form: Form) -> Iterator[dict[str, float]]:
