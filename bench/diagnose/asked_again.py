@@ -69,14 +69,14 @@ def _left(m: Measurement, prepared: Prepared, fit: Fit) -> tuple[Array, Array]:
     return errors, modelled
 
 
-def _let_go(m: Measurement, prepared: Prepared, flags: Faults, fit: Fit) -> Fit:
-    """A fit without samples that are strays for all that it can tell: many have pulled it away from the rest."""
-    errors = _left(m, prepared, fit)[0]
+def _left_by_the_rest(m: Measurement, prepared: Prepared, flags: Faults, fit: Fit) -> tuple[Array, Array]:
+    """The same; of the fit without samples that are strays for all that it can tell, where many have pulled it away."""
+    errors, modelled = _left(m, prepared, fit)
     known = np.isfinite(errors) & flags.good
     off = standing_off(np.where(known, errors, 0.0), known, _unsure(flags), resolution(m.force_N))
     if not strays(m, errors, off):
-        return fit
-    return onto(fit, prepare(m, flags.good & ~off).doubting(prepared.felt).short, 15, 1e-8)
+        return errors, modelled
+    return _left(m, prepared, onto(fit, prepare(m, flags.good & ~off).doubting(prepared.felt).short, 15, 1e-8))
 
 
 def asked_again(
@@ -84,7 +84,7 @@ def asked_again(
 ) -> tuple[Prepared, Faults, Search, Path]:
     """Channel faults against the model found; where that changes which samples count, the fits are carried on. `first`:
     the model is the belief alone, and strays are asked for only where some are known."""
-    errors, modelled = _left(m, prepared, _let_go(m, prepared, flags, path.fits[-1]))
+    errors, modelled = _left_by_the_rest(m, prepared, flags, path.fits[-1])
     stays = halted(m.force_N, modelled, flags.by_itself | ~np.isfinite(errors), prepared.noise.force_N)
     before, flags = flags, replace(flags, stuck=flags.stuck | stays, outlier=flags.outlier & ~stays)
     known = np.isfinite(errors) & ~flags.by_itself
@@ -130,7 +130,8 @@ def _strays_again(
     if (flags.outlier.any() and further.sum() <= few) or strays(m, errors, further | unsure):
         rest &= ~further
     if strays(m, errors, outlier & ~at_rest):  # where they crowd, some show only once the others are gone
-        outlier |= (crowded := standing_off(told, known & ~outlier, suspect, step_N))
+        crowded = standing_off(told, known & ~outlier, suspect, step_N)
+        outlier |= crowded
         rest &= ~crowded
     rest &= ~(pulsed | further & at_rest)  # what stands off alone in a hold is no transient, whatever the model is
     near = (NEAR * prepared.floor_N) ** 2

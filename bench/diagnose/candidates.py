@@ -237,8 +237,7 @@ class Signatures:
         """(χ² that the cause's signature takes, amplitude at which it does); amplitude within the bounds."""
         amplitude, column = cause.amplitude, self.column(cause)
         assert amplitude is not None
-        with np.errstate(over="ignore"):  # of numbers that make no plant
-            square = float(np.sum(column * column))
+        square = _square(column)
         if not np.isfinite(square) or square <= 1e-18:
             return 0.0, 0.0
         along = float(np.sum(column * self.residual))
@@ -252,8 +251,13 @@ class Signatures:
         if not np.isfinite(change).all():
             return -np.inf
         column = self._clear(self.data.whitened(change))
-        with np.errstate(over="ignore"):
-            return float(2.0 * np.sum(column * self.residual) - np.sum(column * column))
+        return float(2.0 * np.sum(column * self.residual)) - _square(column)
+
+
+def _square(column: Array) -> float:
+    """Sum of squares; infinite for a column so large that its numbers make no plant."""
+    with np.errstate(over="ignore"):
+        return float(np.sum(column * column))
 
 
 def combinations(form: Form) -> Iterator[dict[str, float]]:

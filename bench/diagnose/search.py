@@ -219,7 +219,7 @@ class Search(Sieve):
         them apart, or is a law drawn through points, and another comes in front so, or a further cause leaves next to
         nothing; or `anyway`."""
         best = ranked[0]
-        near = [t for t in ranked[1:] if t.id in self._near(now, ranked)]
+        near = self._near(now, ranked)
         # a curve through points is that of any other cause but for crumbs
         told = unexplained(best.fit.chi2, self.expected) > 0.0 or drawn(best)
         if not anyway and not (near and told):
@@ -254,8 +254,7 @@ class Search(Sieve):
         lead = ranked[0]
         if unexplained(lead.fit.chi2, self.expected) <= 0.0:
             return ranked
-        near = [t for t in ranked[1:] if t.id in self._near(path.fits[-1], ranked)]
-        plain = next((t for t in near if t.fit.free + MANY_MORE < lead.fit.free), None)
+        plain = next((t for t in self._near(path.fits[-1], ranked) if t.fit.free + MANY_MORE < lead.fit.free), None)
         if plain is None or not self._two_instead(path, plain, self._told(lead)):
             return ranked
         return [plain, *(t for t in ranked if t is not plain)]
@@ -370,10 +369,10 @@ class Search(Sieve):
         structure, x = reduced(fit, index)
         return refit(self.short, structure, x, 10, 1e-5)
 
-    def _near(self, before: Fit, ranked: Sequence[Trial]) -> list[str]:
-        """Ids that stood close behind the first of a stage."""
+    def _near(self, before: Fit, ranked: Sequence[Trial]) -> list[Trial]:
+        """Those that stood close behind the first of a stage."""
         gain = before.chi2 - ranked[0].fit.chi2
-        return [t.id for t in ranked[1 : 1 + RIVALS] if before.chi2 - t.fit.chi2 > CLOSE * gain]
+        return [t for t in ranked[1 : 1 + RIVALS] if before.chi2 - t.fit.chi2 > CLOSE * gain]
 
     def settled(self, now: Fit, joined: Fit) -> Fit:
         """The fit before a cause was added, or a better one that the addition has led to: a valley may be long."""
@@ -400,7 +399,7 @@ class Search(Sieve):
             stage = min(index - own, len(path.tried) - 1)
             rivals = path.tried[stage][:5] + path.tried[-1][:4]
             if path.fits[-1].chi2 <= 1.05 * self.expected:
-                rivals = self._near(path.fits[stage], path.rivals[stage])
+                rivals = [t.id for t in self._near(path.fits[stage], path.rivals[stage])]
             present = {c.id for c in best.structure.causes}
             rivals = [r for r in dict.fromkeys(rivals) if r not in present]
             if not rivals:

@@ -140,7 +140,7 @@ def test_a_curve_through_points_that_leaves_nothing_stands_against_its_rivals_in
     begun: Any = SimpleNamespace(
         expected=1000.0,
         prepared=SimpleNamespace(memory=1.0),
-        _near=lambda now, ranked: ["encoder_error"],
+        _near=lambda now, ranked: ranked[1:],
         _shaped=lambda t: trial("encoder_error", "two_periods", 800.0) if t is wave else t,
     )
     now: Any = SimpleNamespace(chi2=1e5)
@@ -212,7 +212,7 @@ def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_o
     second = trial("encoder_error", left, 4)
     asked: Any = object.__new__(Expecting)
     asked.prepared, asked.samples = SimpleNamespace(memory=1.0), 10000
-    asked._near = lambda now, ranked: ["force_bias"]
+    asked._near = lambda now, ranked: ranked[1:]
     asked._told = lambda t: t
     asked.ranked = lambda fit, least: [second] if fit is plain.fit else []
     asked.judge = lambda *_: SimpleNamespace(pays=True)
