@@ -166,6 +166,13 @@ class Felt:
             position[inside] = move.position(time_s[inside])
         return np.asarray(position)
 
+    def planned_at(self, time_s: Array) -> NDArray[np.bool_]:
+        """Whether some times (m,) are of planned moves."""
+        inside = np.zeros(len(time_s), dtype=bool)
+        for begin_s, end_s, _ in self.planned:
+            inside |= (time_s >= begin_s) & (time_s <= end_s)
+        return inside
+
     def rest_at(self, time_s: Array) -> NDArray[np.intp]:
         """Number of the rest at some times (m,)."""
         return self.rest[np.clip(np.searchsorted(self.time_s, time_s, side="right") - 1, 0, len(self.rest) - 1)]
@@ -281,6 +288,13 @@ def _one_rest(
 def _by_chance(off: Array) -> bool:
     """Whether noise may be all of some errors, in its standard deviations: each of them, and their mean."""
     return bool(np.all(np.abs(off) <= CHANCE) and abs(float(off.sum())) <= CHANCE * np.sqrt(len(off)))
+
+
+def settled(time_s: Array, position_mm: Array) -> Array:
+    """Smoothed positions (n,), each rest at its level; what `felt` begins with."""
+    clean, std = smoothed(time_s, position_mm)
+    left, noise = float(np.median(std)) if len(std) else 0.0, position_noise(position_mm)
+    return _rested(position_mm, clean, std, noise, left)[0] if 0.0 < left < noise else clean
 
 
 def felt(time_s: Array, position_mm: Array) -> Felt:

@@ -154,8 +154,12 @@ class Prepared:
     position_time_s: Array
     position_std_mm: Array
     position_rest: NDArray[np.intp]
+    position_planned: Mask
     """(p,) each: stamps of the positions; what is left of their noise there; number of the rest, which is off as a
-    whole, 0: in motion."""
+    whole, 0: in motion; whether they are of a planner's move."""
+    position_scatter_mm: float
+    position_step_mm: float
+    """Standard deviation of the positions' noise, rounding included, and the step they are rounded to, 0: none."""
     felt: FeltErrors
     """In `full.sigma_N` too, as if each sample were off by itself: a fit that let go of what stretches share would let
     go of the friction itself."""
@@ -235,9 +239,9 @@ class Prepared:
         return float(np.sqrt(2.0 * (own + together))) / n
 
 
-def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
-    """Grid, noise and stand-in. `good` (m,): force samples that are not channel faults; `between`: with the motion
-    between samples rebuilt. Raises InputError where there is next to nothing to work on.
+def prepare(m: Measurement, good: Mask) -> Prepared:
+    """Grid, noise and stand-in. `good` (m,): force samples that are not channel faults. Raises InputError where there
+    is next to nothing to work on.
     """
     m = restamped(m)
     inside = (m.force_time_s >= m.position_time_s[0]) & (m.force_time_s <= m.position_time_s[-1])
@@ -270,8 +274,8 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
     motion = felt(m.position_time_s, m.position_mm)
     noise = force_noise(m, good)
     sigma_force = max(noise.force_N, resolution(m.force_N) / np.sqrt(12.0), 1e-9)
-    grid, where = union(motion.time_s if between else m.position_time_s, m.force_time_s)
-    position = motion.at(grid) if between else np.interp(grid, m.position_time_s, m.position_mm)
+    grid, where = union(motion.time_s, m.force_time_s)
+    position = motion.at(grid)
     stiffness = stiffness_along(m)
     through = stiffness * np.interp(m.force_time_s, motion.time_s, motion.std_mm)
     sigma, weight, force = np.full(len(grid), sigma_force), np.zeros(len(grid)), np.zeros(len(grid))
@@ -312,6 +316,9 @@ def prepare(m: Measurement, good: Mask, between: bool = True) -> Prepared:
         position_time_s=m.position_time_s,
         position_std_mm=np.interp(m.position_time_s, motion.time_s, motion.std_mm),
         position_rest=motion.rest_at(m.position_time_s),
+        position_planned=motion.planned_at(m.position_time_s),
+        position_scatter_mm=motion.noise_mm,
+        position_step_mm=resolution(m.position_mm),
         felt=FeltErrors(np.zeros(len(grid)), np.zeros(len(grid)), stretch),
     )
 

@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
+from bench.felt_motion import REACHES, settled
 from bench.identify.motion import holds
 
 from .data import Data, FeltErrors, Prepared
@@ -24,20 +25,23 @@ from .refit import Fit, force_at
 Array = NDArray[np.float64]
 
 RUNS = 12
-BENT = 3.0  # times what is left of the noise: smoothing takes as much away as it leaves doubt
+BIASED = 1.5  # times the errors drawn: what is drawn about is smooth already, and smoothing bends it less
+BENT = 3.0  # times what is left of the noise in rests and planned moves: those may be bent, too
 TOGETHER = 7  # entries whose scatter is taken for one
 SEEN = 0.3  # of the noise: less changes nothing
 
 
-def felt_errors(prepared: Prepared, fit: Fit, rng: np.random.Generator) -> FeltErrors:
-    """What errors of the positions make through the causes of a fit, and chance in when its forces were felt."""
+def felt_errors(prepared: Prepared, fit: Fit, errors_mm: Array) -> FeltErrors:
+    """What errors of the positions make through the causes of a fit, and chance in when its forces were felt.
+
+    `errors_mm` (runs, p): such errors, as `redrawn` draws them.
+    """
     stretch, resting = _rests(prepared.full)
     data = replace(prepared.full, tared=None)
     bare = replace(fit.structure, causes=())
     pad = bare.x(fit.x[: len(bare.pad.coordinates)], [], fit.of_run)
     full, through_pad = _Scatter(data, stretch, fit.structure, fit.x), _Scatter(data, stretch, bare, pad)
-    for _ in range(RUNS):
-        error = BENT * prepared.position_std_mm * _drawn(prepared.position_rest, rng)
+    for error in errors_mm:
         position = data.position_mm + np.interp(data.time_s, prepared.position_time_s, error)
         for scatter in (full, through_pad):
             scatter.add(position)
@@ -57,6 +61,50 @@ def felt_errors(prepared: Prepared, fit: Fit, rng: np.random.Generator) -> FeltE
     least = (SEEN * prepared.noise.force_N) ** 2
     own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
     return FeltErrors(own_N, shared_N, stretch, late_s)
+
+
+def redrawn(prepared: Prepared, rng: np.random.Generator) -> Array:
+    """Errors (`RUNS`, p) of the motion as felt, mm. About motion that is no planner's move the noise of the positions
+    is laid on it anew and taken out again, so that neighbours share what they share in the measurement: the parametric
+    bootstrap (B. Efron, Bootstrap methods: another look at the jackknife, Ann. Statist. 7, 1979, 1–26). A rest goes
+    from the error where it begins to that where it ends; in planner's moves each sample has one of its own.
+    """
+    rest, time = prepared.position_rest, prepared.position_time_s
+    std = BENT * prepared.position_std_mm
+    position = np.interp(time, prepared.full.time_s, prepared.full.position_mm)
+    stretches = _stretches((rest == 0) & ~prepared.position_planned)
+    bent = np.zeros(len(rest), dtype=bool)
+    for stretch in stretches:
+        bent[stretch] = True
+    bent &= ~prepared.position_planned
+    out = np.empty((RUNS, len(rest)))
+    for error in out:
+        read = _read_again(prepared, position, rng)
+        for stretch in stretches:
+            error[stretch] = BIASED * (settled(time[stretch], read[stretch]) - position[stretch])
+        of_rests = std * rng.standard_normal(int(rest.max()) + 1)[rest]
+        error[~bent] = np.interp(time[~bent], time[bent], error[bent]) if bent.any() else of_rests[~bent]
+        error += np.where(prepared.position_planned, std * rng.standard_normal(len(rest)), 0.0)
+    return out
+
+
+def _read_again(prepared: Prepared, position_mm: Array, rng: np.random.Generator) -> Array:
+    """Positions (p,) as they might have been read as well, wherever the scale's zero is."""
+    step_mm = prepared.position_step_mm
+    noise_mm = np.sqrt(max(prepared.position_scatter_mm**2 - step_mm**2 / 12.0, 0.0))
+    read = position_mm + noise_mm * rng.standard_normal(len(position_mm))
+    if step_mm == 0.0:
+        return np.asarray(read)
+    zero = step_mm * rng.uniform()
+    return np.asarray(step_mm * np.round((read - zero) / step_mm) + zero)
+
+
+def _stretches(moving: NDArray[np.bool_]) -> list[slice]:
+    """Runs of samples that move, with as many on either side as a window reaches."""
+    reach = int(REACHES[-1])
+    near = binary_dilation(moving, iterations=reach).astype(np.int8)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], near, [0]]))).reshape(-1, 2)
+    return [slice(a, b) for a, b in edges.tolist()]
 
 
 class _Moments:
@@ -91,12 +139,6 @@ class _Scatter:
         common = _common(self.stretch, self.data.weight, change)
         self.shared.add(common)
         self.own.add(change - common)
-
-
-def _drawn(rest: NDArray[np.intp], rng: np.random.Generator) -> Array:
-    """Errors (p,) of scatter 1: one for each rest, and of each position in motion by itself."""
-    of_rests = rng.standard_normal(int(rest.max()) + 1)[rest]
-    return np.where(rest > 0, of_rests, rng.standard_normal(len(rest)))
 
 
 def _rests(data: Data) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:

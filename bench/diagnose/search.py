@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from .candidates import CHANNEL, Signatures, alike, combinations, forms, narrowed, starts
 from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
-from .felt_errors import felt_errors
+from .felt_errors import felt_errors, redrawn
 from .late_by_chance import late_by_chance_s
 from .numbers import Cause, cause_of
 from .path import Measure, Path, Trial
@@ -61,6 +62,11 @@ class _Turn:
 
 class Search(Sieve):
     """One search on one measurement."""
+
+    @cached_property
+    def motion_errors_mm(self) -> Array:
+        """What the motion as felt may be off by (runs, p), drawn once."""
+        return redrawn(self.prepared, np.random.default_rng(SEED))
 
     def base(self, pads: Sequence[Array]) -> Fit:
         """The believed structure with its numbers refitted, from each of some vectors of the pad."""
@@ -281,14 +287,14 @@ class Search(Sieve):
         """What the last fit's causes make of errors of the positions is noise: nothing else tells of it."""
         last = path.fits[-1]
         if last.structure.causes:
-            self._doubting(path, felt_errors(self.prepared, last, np.random.default_rng(SEED)))
+            self._doubting(path, felt_errors(self.prepared, last, self.motion_errors_mm))
 
     def _late_by_chance(self, path: Path, fit: Fit) -> bool:
         """Whether the forces of a fit were felt earlier or later by chance, of which nobody knew yet: then that is
         noise, and what makes them late is asked for again."""
         if late_by_chance_s(self.prepared, fit) <= LATER_BY_CHANCE * self.prepared.felt.late_s:
             return False
-        self._doubting(path, felt_errors(self.prepared, fit, np.random.default_rng(SEED)))
+        self._doubting(path, felt_errors(self.prepared, fit, self.motion_errors_mm))
         return True
 
     def _doubting(self, path: Path, felt: FeltErrors) -> None:

@@ -92,9 +92,7 @@ def test_csv_is_taken_as_it_is(fitted, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("hidden", "known"),
     [
-        pytest.param(
-            [{"id": "friction", "coulomb": 0.15}], [{"id": "friction", "coulomb": 0.1}], marks=pytest.mark.long
-        ),
+        ([{"id": "friction", "coulomb": 0.15}], [{"id": "friction", "coulomb": 0.1}]),
         ([{"id": "mains_hum", "amplitude": 0.06, "frequency": 50.1}], []),
         ([{"id": "force_bias", "bias": 0.08}], []),
     ],

@@ -12,7 +12,7 @@ import pytest
 from bench.diagnose import diagnose
 from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import believed_structure
-from bench.diagnose.felt_errors import felt_errors
+from bench.diagnose.felt_errors import felt_errors, redrawn
 from bench.diagnose.refit import refit
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
@@ -73,7 +73,8 @@ def felt(effects: list[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray, np.ndar
     p = prepare(m, np.ones(len(m.force_N), dtype=bool))
     structure = believed_structure(Model.from_dict({**c.believed, "effects": effects}), p)
     fit = refit(p.short, structure, structure.x(structure.pad.x()), 0, 1.0)
-    return p.full.position_mm[p.at], felt_errors(p, fit, np.random.default_rng(0)).total_N[p.at], p.full.sigma_N[p.at]
+    told = felt_errors(p, fit, redrawn(p, np.random.default_rng(0)))
+    return p.full.position_mm[p.at], told.total_N[p.at], p.full.sigma_N[p.at]
 
 
 def test_errors_of_the_position_are_felt_by_what_feels_more_than_the_pad():
