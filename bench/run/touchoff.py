@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .pull import Contact, contacts_of_a_pull, pulls
+
 Array = NDArray[np.float64]
 
 EXPONENTS = (1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 2.75, 3.0, 3.5)
@@ -105,17 +107,21 @@ def surface_in_pieces(
     Yields after every half millisecond or so of computing: whoever has a motor to feed meanwhile, feeds it.
 
     The part in air fixes the level (a constant, so that what drifted since the tare does not move the surface), the
-    part in contact the rise. Returns None when too little of the approach was in contact to say.
+    part in contact the rise. Where the force falls before it rises the pad pulls: `bench.run.pull`. Returns None when
+    too little of the approach was in contact to say.
     `position_sigma_mm` (encoder noise, jitter of stamps) adds to the result's standard deviation.
     """
     sigma = max(sigma_N, 1e-12)
     if not np.ptp(position_mm) > 0.0:
         return None
-    fits: list[_Fit] = []
-    for n in EXPONENTS:
-        fit = yield from _fit_exponent(position_mm, force_N, sigma, n)
-        if fit is not None:
-            fits.append(fit)
+    fits: list[Contact] = []
+    if pulls(force_N, SIGMAS * sigma):
+        fits = yield from contacts_of_a_pull(position_mm, force_N, sigma, MIN_SAMPLES_IN_CONTACT)
+    else:
+        for n in EXPONENTS:
+            fit = yield from _fit_exponent(position_mm, force_N, sigma, n)
+            if fit is not None:
+                fits.append(fit)
     if not fits:
         return None
     chi2 = np.array([fit.chi2 for fit in fits])
@@ -141,16 +147,7 @@ def warm_up() -> None:
     find_surface(x, np.maximum(x - 0.5, 0.0), 1e-3)
 
 
-@dataclass(frozen=True)
-class _Fit:
-    x0_mm: float
-    std_mm: float
-    chi2: float
-    exponent: float
-    end_force_N: float
-
-
-def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Generator[None, None, _Fit | None]:
+def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Generator[None, None, Contact | None]:
     """Least squares of level + k r^n + k' r^(n+1), r = max(0, x − x0): x0 by a grid that closes in, the rest linear."""
     span = float(x.max() - x.min())
     lo, hi = float(x.min()), float(x.max()) - 1e-6 * span
@@ -179,7 +176,7 @@ def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Gene
         return None
     # Where the data say nothing, still: somewhere within the approach, anywhere alike.
     std = min(float(np.sqrt(max(covariance[3, 3], 0.0))) / scale[3], span / np.sqrt(12.0))
-    return _Fit(x0, std, chi2 / sigma**2, exponent, gain * depth**exponent + bend * depth ** (exponent + 1.0))
+    return Contact(x0, std, chi2 / sigma**2, exponent, gain * depth**exponent + bend * depth ** (exponent + 1.0))
 
 
 def _costs(x: Array, force: Array, x0: Array, exponent: float) -> Array:

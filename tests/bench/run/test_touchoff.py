@@ -1,5 +1,7 @@
 """The surface estimate against pads of the independent simulator: its error, and whether it knows its error."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,19 @@ SIGMA_N = 0.01
 SPEED_MM_S = 0.25
 
 
-def approach(seed: int) -> tuple[np.ndarray, np.ndarray, float]:
+def no_pull(gap_mm: np.ndarray) -> np.ndarray:
+    return np.zeros_like(gap_mm)
+
+
+PULLS = {
+    "dies_out": lambda gap_mm: 0.1 * np.exp(-gap_mm / 0.06),
+    "of_a_sphere": lambda gap_mm: 0.12 / (1.0 + gap_mm / 0.08) ** 2,
+    "short": lambda gap_mm: 0.06 * np.exp(-gap_mm / 0.015),
+}
+"""Of adhesion, N over the gap; in contact they stay."""
+
+
+def approach(seed: int, pull: Callable[[np.ndarray], np.ndarray] = no_pull) -> tuple[np.ndarray, np.ndarray, float]:
     """Positions (motor frame), noisy forces of a slow approach that stops at 0.1 N, and the true surface."""
     rng = np.random.default_rng(seed)
     pad = draw.pad(rng).pad
@@ -20,6 +34,7 @@ def approach(seed: int) -> tuple[np.ndarray, np.ndarray, float]:
     motion = Path(-0.1 - rng.uniform(0, 0.05), 5000.0).to(4.0, SPEED_MM_S).motion()
     time_s = np.arange(0.0, motion.duration_s, 1 / 550)
     force = simulate(pad, motion, time_s).force_N + rng.normal(0.0, SIGMA_N, time_s.size)
+    force -= pull(np.maximum(-motion.position(time_s), 0.0))
     both = np.flatnonzero((force[1:] >= 0.1) & (force[:-1] >= 0.1))
     end = int(both[0]) + 2
     return motion.position(time_s)[:end] + surface, force[:end], surface
@@ -38,6 +53,33 @@ def test_error_and_stated_deviation_agree():
     assert np.mean(np.abs(z) < 2) >= 0.90
     assert np.mean(np.abs(z) < 3) >= 0.95
     assert np.median(np.abs(errors)) < 0.02
+
+
+@pytest.mark.parametrize("shape", PULLS)
+def test_a_pad_that_pulls_begins_where_it_is_touched(shape):
+    """Not where it is felt first, and not where the force is zero again."""
+    errors, stated = [], []
+    for seed in range(12):
+        x, force, truth = approach(seed, PULLS[shape])
+        found = find_surface(x, force, SIGMA_N)
+        assert found is not None
+        errors.append(found.position_mm - truth)
+        stated.append(found.std_mm)
+    z = np.array(errors) / np.array(stated)
+    assert np.mean(np.abs(z) < 3) >= 0.9, z
+    assert np.median(np.abs(errors)) < 0.005
+
+
+def test_where_a_pull_is_there_at_once_the_surface_is_within_its_range():
+    """It is told less well: what is soft at first is like what pulls the same over a gap."""
+    errors = []
+    for seed in range(12):
+        x, force, truth = approach(seed, lambda gap_mm: 0.08 * (gap_mm < 0.05))
+        found = find_surface(x, force, SIGMA_N)
+        assert found is not None
+        errors.append(found.position_mm - truth)
+    assert np.max(np.abs(errors)) < 0.06
+    assert np.median(np.abs(errors)) < 0.03
 
 
 def test_known_exponent_reaches_the_bound():

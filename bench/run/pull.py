@@ -1,0 +1,162 @@
+"""Touch-off on a pad that pulls the probe in before it touches: adhesion, or charge.
+
+The force falls towards the surface and turns there: level − P s(g) before contact, g the gap, and level − P +
+k r^n + k' r^(n+1) in it, r the depth. The pull is one of a few shapes s(g) with s(0) = 1, and stays in contact as it is
+at touch (B. V. Derjaguin, V. M. Muller, Yu. P. Toporov, J. Colloid Interface Sci. 53, 1975, 314–326). Each shape, its
+range and the exponent are fitted, and all count that fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SHAPES: tuple[Callable[[Array], Array], ...] = (
+    lambda q: np.exp(-q),
+    lambda q: 1.0 / (1.0 + q) ** 2,  # of a sphere: J. N. Israelachvili, Intermolecular and Surface Forces, 2011
+    lambda q: np.where(q < 1.0, 1.0, 0.0),  # D. S. Dugdale, J. Mech. Phys. Solids 8, 1960, 100–104
+)
+"""Pull over the gap in units of its range; the last one ends there at once."""
+
+EXPONENTS = (1.0, 1.5, 2.0, 2.5, 3.5)
+"""Of first contact, as in `bench.run.touchoff`; with the next term free, those between are near one of these."""
+
+TOGETHER = 5
+"""Samples whose mean tells whether the force falls."""
+
+IN_AIR = 40
+"""Samples at the begin of an approach that are in air, however soft the pad: a tenth of a millimetre at least."""
+
+PLACES, RANGES, ROUNDS = 33, 9, 4
+"""Surfaces and ranges on a grid, and how often it closes in."""
+
+SHORTEST, LONGEST = 0.005, 0.7
+"""Ranges, as shares of the approach."""
+
+OFFSETS = np.geomspace(2e-3, 0.2, 7)
+"""Surfaces beside the least force that are tried, as shares of the approach."""
+
+UNTOLD = 0.3
+"""Of a range at whose end the pull is there at once: so far from touch a pad that is soft at first is felt."""
+
+SUNK = 0.03
+"""Of the depth of an approach, that the touch before it may have left: noise alone tells the turn to less than that."""
+
+AT_ONCE = 5
+"""Fits between two turns of a motor's loop."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A fit of the first contact: surface and its standard deviation, χ², the exponent, and the force at the end."""
+
+    x0_mm: float
+    std_mm: float
+    chi2: float
+    exponent: float
+    end_force_N: float
+
+
+def pulls(force_N: Array, least_N: float) -> bool:
+    """Whether the force of an approach (n,) falls below that in air before it rises; `least_N`: what one sample must
+    fall by to be no noise."""
+    if force_N.size < 4 * TOGETHER:
+        return False
+    smooth = np.convolve(force_N, np.ones(TOGETHER) / TOGETHER, mode="valid")
+    air_N = float(np.mean(force_N[: min(force_N.size // 4, IN_AIR)]))
+    return bool(air_N - float(smooth.min()) > least_N * np.sqrt(2.0 / TOGETHER))
+
+
+def contacts_of_a_pull(
+    position_mm: Array, force_N: Array, sigma_N: float, fewest: int
+) -> Generator[None, None, list[Contact]]:
+    """The fits, one for each shape and exponent. Positions and forces (n,), in the order of time; `fewest`: samples in
+    contact. Yields often, as whoever has a motor to feed wants it."""
+    out = []
+    for shape in SHAPES:
+        for exponent in EXPONENTS:
+            fit = yield from _fit(position_mm, force_N, sigma_N, shape, exponent)
+            if fit is not None and np.count_nonzero(position_mm > fit.x0_mm) >= fewest:
+                out.append(fit)
+    return out
+
+
+def _fit(
+    x: Array, force: Array, sigma: float, shape: Callable[[Array], Array], exponent: float
+) -> Generator[None, None, Contact | None]:
+    span = float(x.max() - x.min())
+    most = float(x.max()) - 1e-3 * span
+    lowest, edge = _lowest_and_edge(x, force)
+    beside = lowest + span * np.concatenate([-OFFSETS, [0.0], OFFSETS])
+    places = np.union1d(np.linspace(float(x.min()), most, PLACES), beside)
+    places = places[(places > x.min()) & (places < most)]
+    near = span / PLACES
+    ends = shape is SHAPES[-1]
+    ranges = np.geomspace(SHORTEST * span, LONGEST * span, RANGES)
+    best = np.inf, places[0], ranges[0]
+    for _ in range(ROUNDS):
+        done = 0
+        for x0 in places.tolist():
+            for reach in [max(x0 - edge, 1e-9)] if ends else ranges.tolist():
+                chi2, c = _cost(x, force, _basis(x, x0, reach, shape, exponent))
+                depth = float(x.max()) - x0
+                if chi2 < best[0] and c[1] > 0 and c[2] > 0 and c[2] + c[3] * depth > 0:
+                    best = chi2, x0, reach
+                done += 1
+                if done % AT_ONCE == 0:
+                    yield
+        if not np.isfinite(best[0]):
+            return None
+        apart = float(ranges[1] / ranges[0])
+        places = np.linspace(best[1] - near, best[1] + near, 9)
+        places, near = places[places < most], 0.3 * near
+        ranges = best[2] * apart ** np.linspace(-1.0, 1.0, 5)
+    chi2, x0, reach = best
+    basis = _basis(x, x0, reach, shape, exponent)
+    _, c = _cost(x, force, basis)
+    step, ratio = 1e-3 * span, 1.02
+    by_place = (_basis(x, x0 + step, reach, shape, exponent) - _basis(x, x0 - step, reach, shape, exponent)) @ c
+    by_range = (_basis(x, x0, reach * ratio, shape, exponent) - _basis(x, x0, reach / ratio, shape, exponent)) @ c
+    jacobian = np.column_stack([basis, by_range, by_place / (2.0 * step)])
+    scale = np.maximum(np.abs(jacobian).max(axis=0), 1e-300)
+    # what no shape meets counts as noise
+    astray = max(chi2 / sigma**2 / max(x.size - jacobian.shape[1], 1), 1.0)
+    covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * sigma**2 * astray
+    std = min(float(np.sqrt(max(covariance[-1, -1], 0.0))) / scale[-1], span / np.sqrt(12.0))
+    depth = float(x.max()) - x0
+    std = float(np.hypot(std, SUNK * depth))
+    if ends:
+        std = float(np.hypot(std, UNTOLD * (x0 - edge)))
+    rise = float(c[2] * depth**exponent + c[3] * depth ** (exponent + 1.0))
+    return Contact(x0, std, chi2 / sigma**2, exponent, rise)
+
+
+def _lowest_and_edge(x: Array, force: Array) -> tuple[float, float]:
+    """Where the force is least, and where it falls the most within a few samples, mm."""
+    kernel = np.ones(TOGETHER) / TOGETHER
+    smooth = np.convolve(force, kernel, mode="valid")
+    fall = smooth[TOGETHER:] - smooth[:-TOGETHER]
+    at = int(np.argmin(fall)) + TOGETHER
+    return float(x[int(np.argmin(smooth)) + TOGETHER // 2]), 0.5 * float(x[at - 1] + x[at])
+
+
+def _basis(x: Array, x0: float, reach: float, shape: Callable[[Array], Array], exponent: float) -> Array:
+    """Columns of the level, the pull P, k and k' (n, 4)."""
+    r = np.maximum(x - x0, 0.0)
+    rise = r**exponent
+    return np.column_stack([np.ones_like(x), -shape(np.maximum(x0 - x, 0.0) / reach), rise, rise * r])
+
+
+def _cost(x: Array, force: Array, basis: Array) -> tuple[float, Array]:
+    """Sum of squares and the coefficients."""
+    scale = np.maximum(np.sqrt((basis * basis).sum(axis=0)), 1e-300)
+    unit = basis / scale
+    normal = unit.T @ unit + 1e-12 * np.eye(unit.shape[1])
+    c = np.linalg.solve(normal, unit.T @ force)
+    rest = force - unit @ c
+    return float(rest @ rest), np.asarray(c / scale)
