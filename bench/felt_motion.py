@@ -8,7 +8,7 @@ samples, a trapezoid's pieces are met exactly, and corners keep their place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -292,9 +292,34 @@ def _by_chance(off: Array) -> bool:
 
 def settled(time_s: Array, position_mm: Array) -> Array:
     """Smoothed positions (n,), each rest at its level; what `felt` begins with."""
+    return _settled(time_s, position_mm).clean_mm
+
+
+@dataclass(frozen=True)
+class _Settled:
+    """Smoothed positions (n,) with each rest at its level, their standard deviations (n,), the number of the rest (n,),
+    0: in motion; what is left of the noise of all, and that noise, mm."""
+
+    clean_mm: Array
+    std_mm: Array
+    hold: NDArray[np.intp]
+    left_mm: float
+    noise_mm: float
+
+    @property
+    def smoother(self) -> bool:
+        """Whether there was noise that smoothing took away."""
+        return 0.0 < self.left_mm < self.noise_mm
+
+
+def _settled(time_s: Array, position_mm: Array) -> _Settled:
     clean, std = smoothed(time_s, position_mm)
-    left, noise = float(np.median(std)) if len(std) else 0.0, position_noise(position_mm)
-    return _rested(position_mm, clean, std, noise, left)[0] if 0.0 < left < noise else clean
+    left = float(np.median(std)) if len(std) else 0.0
+    found = _Settled(clean, std, np.zeros(len(clean), dtype=np.intp), left, position_noise(position_mm))
+    if not found.smoother:
+        return found
+    clean, std, hold = _rested(position_mm, clean, std, found.noise_mm, left)
+    return replace(found, clean_mm=clean, std_mm=std, hold=hold)
 
 
 def felt(time_s: Array, position_mm: Array) -> Felt:
@@ -303,15 +328,12 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
     A move that is a planner's trapezoid, as far as its noisy samples tell, becomes that trapezoid: a moving mass and a
     lag feel accelerations and corners that no smoothing keeps.
     """
-    clean, std = smoothed(time_s, position_mm)
-    left = float(np.median(std)) if len(std) else 0.0
-    noise = position_noise(position_mm)
+    begun = _settled(time_s, position_mm)
+    clean, std, hold, left, noise = begun.clean_mm, begun.std_mm, begun.hold, begun.left_mm, begun.noise_mm
     planned: Moves = {}
     stretch = -1 - np.arange(len(clean)) // TOGETHER
-    hold = np.zeros(len(clean), dtype=np.intp)
-    if 0.0 < left < noise:
+    if begun.smoother:
         step, coarse = resolution(position_mm), _coarse(position_mm)
-        clean, std, hold = _rested(position_mm, clean, std, noise, left)
         stretch = np.where(hold > 0, hold, stretch)
         planned = planned_moves(time_s, position_mm, clean, noise, left, hold > 0)
         for (first, last), move in planned.items():

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import InputError
-from bench.felt_motion import felt, resolution
+from bench.felt_motion import Felt, felt, resolution
 from bench.identify.noise import stiffness_along
 from bench.identify.problem import sized, touches
 from bench.recording.types import Measurement
@@ -152,14 +152,11 @@ class Prepared:
     depth_mm: float
     force_scale_N: float
     position_time_s: Array
-    position_std_mm: Array
-    position_rest: NDArray[np.intp]
-    position_planned: Mask
-    """(p,) each: stamps of the positions; what is left of their noise there; number of the rest, which is off as a
-    whole, 0: in motion; whether they are of a planner's move."""
-    position_scatter_mm: float
+    """Stamps of the positions (p,)."""
+    motion: Felt
+    """The motion behind their noise."""
     position_step_mm: float
-    """Standard deviation of the positions' noise, rounding included, and the step they are rounded to, 0: none."""
+    """What they are rounded to; 0: nothing."""
     felt: FeltErrors
     """In `full.sigma_N` too, as if each sample were off by itself: a fit that let go of what stretches share would let
     go of the friction itself."""
@@ -314,10 +311,7 @@ def prepare(m: Measurement, good: Mask) -> Prepared:
         depth_mm=depth,
         force_scale_N=max(float(np.abs(m.force_N[counted]).max()), 1e-6),
         position_time_s=m.position_time_s,
-        position_std_mm=np.interp(m.position_time_s, motion.time_s, motion.std_mm),
-        position_rest=motion.rest_at(m.position_time_s),
-        position_planned=motion.planned_at(m.position_time_s),
-        position_scatter_mm=motion.noise_mm,
+        motion=motion,
         position_step_mm=resolution(m.position_mm),
         felt=FeltErrors(np.zeros(len(grid)), np.zeros(len(grid)), stretch),
     )

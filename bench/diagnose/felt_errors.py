@@ -69,14 +69,15 @@ def redrawn(prepared: Prepared, rng: np.random.Generator) -> Array:
     bootstrap (B. Efron, Bootstrap methods: another look at the jackknife, Ann. Statist. 7, 1979, 1–26). A rest goes
     from the error where it begins to that where it ends; in planner's moves each sample has one of its own.
     """
-    rest, time = prepared.position_rest, prepared.position_time_s
-    std = BENT * prepared.position_std_mm
+    time, motion = prepared.position_time_s, prepared.motion
+    rest, planned = motion.rest_at(time), motion.planned_at(time)
+    std = BENT * np.interp(time, motion.time_s, motion.std_mm)
     position = np.interp(time, prepared.full.time_s, prepared.full.position_mm)
-    stretches = _stretches((rest == 0) & ~prepared.position_planned)
+    stretches = _stretches((rest == 0) & ~planned)
     bent = np.zeros(len(rest), dtype=bool)
     for stretch in stretches:
         bent[stretch] = True
-    bent &= ~prepared.position_planned
+    bent &= ~planned
     out = np.empty((RUNS, len(rest)))
     for error in out:
         read = _read_again(prepared, position, rng)
@@ -84,14 +85,14 @@ def redrawn(prepared: Prepared, rng: np.random.Generator) -> Array:
             error[stretch] = BIASED * (settled(time[stretch], read[stretch]) - position[stretch])
         of_rests = std * rng.standard_normal(int(rest.max()) + 1)[rest]
         error[~bent] = np.interp(time[~bent], time[bent], error[bent]) if bent.any() else of_rests[~bent]
-        error += np.where(prepared.position_planned, std * rng.standard_normal(len(rest)), 0.0)
+        error += np.where(planned, std * rng.standard_normal(len(rest)), 0.0)
     return out
 
 
 def _read_again(prepared: Prepared, position_mm: Array, rng: np.random.Generator) -> Array:
     """Positions (p,) as they might have been read as well, wherever the scale's zero is."""
     step_mm = prepared.position_step_mm
-    noise_mm = np.sqrt(max(prepared.position_scatter_mm**2 - step_mm**2 / 12.0, 0.0))
+    noise_mm = np.sqrt(max(prepared.motion.noise_mm**2 - step_mm**2 / 12.0, 0.0))
     read = position_mm + noise_mm * rng.standard_normal(len(position_mm))
     if step_mm == 0.0:
         return np.asarray(read)

@@ -78,35 +78,42 @@ def contacts_of_a_pull(
     """The fits, one for each shape and exponent. Positions and forces (n,), in the order of time; `fewest`: samples in
     contact. Yields often, as whoever has a motor to feed wants it."""
     out = []
+    turns = _lowest_and_edge(position_mm, force_N)
     for shape in SHAPES:
         for exponent in EXPONENTS:
-            fit = yield from _fit(position_mm, force_N, sigma_N, shape, exponent)
+            fit = yield from _fit(position_mm, force_N, sigma_N, turns, shape, exponent)
             if fit is not None and np.count_nonzero(position_mm > fit.x0_mm) >= fewest:
                 out.append(fit)
     return out
 
 
 def _fit(
-    x: Array, force: Array, sigma: float, shape: Callable[[Array], Array], exponent: float
+    x: Array,
+    force: Array,
+    sigma: float,
+    turns: tuple[float, float],
+    shape: Callable[[Array], Array],
+    exponent: float,
 ) -> Generator[None, None, Contact | None]:
-    span = float(x.max() - x.min())
-    most = float(x.max()) - 1e-3 * span
-    lowest, edge = _lowest_and_edge(x, force)
+    """The best surface and range of one shape and exponent. `turns`: as `_lowest_and_edge` finds them."""
+    (lowest, edge), deepest = turns, float(x.max())
+    span = deepest - float(x.min())
+    most = deepest - 1e-3 * span
     beside = lowest + span * np.concatenate([-OFFSETS, [0.0], OFFSETS])
     places = np.union1d(np.linspace(float(x.min()), most, PLACES), beside)
     places = places[(places > x.min()) & (places < most)]
     near = span / PLACES
     ends = shape is SHAPES[-1]
     ranges = np.geomspace(SHORTEST * span, LONGEST * span, RANGES)
-    best = np.inf, places[0], ranges[0]
+    best = np.inf, float(places[0]), float(ranges[0]), np.zeros(4)
     for _ in range(ROUNDS):
         done = 0
         for x0 in places.tolist():
             for reach in [max(x0 - edge, 1e-9)] if ends else ranges.tolist():
-                chi2, c = _cost(x, force, _basis(x, x0, reach, shape, exponent))
-                depth = float(x.max()) - x0
+                chi2, c = _cost(force, _basis(x, x0, reach, shape, exponent))
+                depth = deepest - x0
                 if chi2 < best[0] and c[1] > 0 and c[2] > 0 and c[2] + c[3] * depth > 0:
-                    best = chi2, x0, reach
+                    best = chi2, x0, reach, c
                 done += 1
                 if done % AT_ONCE == 0:
                     yield
@@ -116,9 +123,8 @@ def _fit(
         places = np.linspace(best[1] - near, best[1] + near, 9)
         places, near = places[places < most], 0.3 * near
         ranges = best[2] * apart ** np.linspace(-1.0, 1.0, 5)
-    chi2, x0, reach = best
+    chi2, x0, reach, c = best
     basis = _basis(x, x0, reach, shape, exponent)
-    _, c = _cost(x, force, basis)
     step, ratio = 1e-3 * span, 1.02
     by_place = (_basis(x, x0 + step, reach, shape, exponent) - _basis(x, x0 - step, reach, shape, exponent)) @ c
     by_range = (_basis(x, x0, reach * ratio, shape, exponent) - _basis(x, x0, reach / ratio, shape, exponent)) @ c
@@ -128,7 +134,7 @@ def _fit(
     astray = max(chi2 / sigma**2 / max(x.size - jacobian.shape[1], 1), 1.0)
     covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * sigma**2 * astray
     std = min(float(np.sqrt(max(covariance[-1, -1], 0.0))) / scale[-1], span / np.sqrt(12.0))
-    depth = float(x.max()) - x0
+    depth = deepest - x0
     std = float(np.hypot(std, SUNK * depth))
     if ends:
         std = float(np.hypot(std, UNTOLD * (x0 - edge)))
@@ -152,7 +158,7 @@ def _basis(x: Array, x0: float, reach: float, shape: Callable[[Array], Array], e
     return np.column_stack([np.ones_like(x), -shape(np.maximum(x0 - x, 0.0) / reach), rise, rise * r])
 
 
-def _cost(x: Array, force: Array, basis: Array) -> tuple[float, Array]:
+def _cost(force: Array, basis: Array) -> tuple[float, Array]:
     """Sum of squares and the coefficients."""
     scale = np.maximum(np.sqrt((basis * basis).sum(axis=0)), 1e-300)
     unit = basis / scale
