@@ -13,7 +13,16 @@ from bench.run.axis import Axis
 from bench.run.loop import Loop, Script, Window
 from bench.run.motion import Mover
 from bench.run.safety import ZERO_LOST_SHARE
-from bench.run.touchoff import MIN_SAMPLES_IN_CONTACT, Air, Surface, air_of, surface_in_pieces, threshold_N, unsteady_N
+from bench.run.touchoff import (
+    MIN_SAMPLES_IN_CONTACT,
+    Air,
+    Surface,
+    air_of,
+    surface_in_pieces,
+    threshold_N,
+    turned,
+    unsteady_N,
+)
 
 TARE_S = 1.0
 """How long the zero is averaged: 550 samples of 10 mN noise give it to 0.4 mN."""
@@ -106,7 +115,7 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float, 
                 f"the probe already touches something: the force fell by {fall:.3f} N when it backed off "
                 f"{backed_mm:.2f} mm (threshold {touch:.3f} N); retract the probe (or lower the pad) and start again"
             )
-        air = replace(air, moving_N=moving_N)
+        air = replace(air, moving_N=moving_N, turns_N=rubs_N)
     # a servo that settles creeps within what friction needs to turn round
     steady_N = max(asked_N, min(5.0 * air.sigma_N, unsteady_N(np.array(window.gross_N)))) + 0.5 * rubs_N
     if abs(air.drift_N_s) * seconds > steady_N:
@@ -175,10 +184,10 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
     rest_s = RECOVER_S
     for _ in range(MOST_PASSES):
         _fresh_tare(loop)
-        here_N = yield from _rest_at(loop, mover, begin, approach.speed, rest_s)
+        here_N = yield from _rest_at(loop, mover, begin, approach.speed, rest_s, air)
         if here_N > limit and begin > start:
             begin = start
-            here_N = yield from _rest_at(loop, mover, begin, approach.speed, rest_s)
+            here_N = yield from _rest_at(loop, mover, begin, approach.speed, rest_s, air)
         if here_N > limit:
             raise Stopped(
                 f"the load cell reads {here_N:.3f} N at {begin:.3f} mm, where it was tared: its zero has moved "
@@ -208,8 +217,13 @@ def touch_off(loop: Loop, mover: Mover, approach: Approach, air: Air, position_s
     return surface
 
 
-def _rest_at(loop: Loop, mover: Mover, position_mm: float, speed_mm_s: float, rest_s: float) -> Script[float]:
-    """Go there and rest; the mean net force at the end of the rest, N."""
+def _rest_at(loop: Loop, mover: Mover, position_mm: float, speed_mm_s: float, rest_s: float, air: Air) -> Script[float]:
+    """Go there and rest; the mean net force at the end of the rest, N.
+
+    Where friction shows, from further off: one that turns round on the slow approach is no level in air.
+    """
+    if air.turns_N > 0.0:
+        yield from mover.go(max(loop.monitor.envelope.position_mm[0], position_mm - TURN_MM), speed_mm_s)
     yield from mover.go(position_mm, speed_mm_s)
     yield from loop.sleep(rest_s - CHECK_S)
     return (yield from _average(loop, CHECK_S)) - loop.tare_N
@@ -359,4 +373,5 @@ def _surface_of(window: Window, air: Air, position_sigma_mm: float) -> Script[Su
         return None
     # What follows the deepest point is the braked stand: the pad relaxes there, and no longer tells its surface.
     end = int(np.argmax(x)) + 1
-    return (yield from surface_in_pieces(x[:end], force[:end], air.sigma_N, position_sigma_mm))
+    begin = turned(force[:end], air)
+    return (yield from surface_in_pieces(x[begin:end], force[begin:end], air.sigma_N, position_sigma_mm))

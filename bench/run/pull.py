@@ -53,13 +53,16 @@ AT_ONCE = 5
 
 @dataclass(frozen=True)
 class Contact:
-    """A fit of the first contact: surface and its standard deviation, χ², the exponent, and the force at the end."""
+    """A fit of the first contact: surface and its standard deviation if noise is all that is left, χ², how many numbers
+    were fitted, the exponent, the force at the end, and what is left of the samples (n,)."""
 
     x0_mm: float
     std_mm: float
     chi2: float
+    free: int
     exponent: float
     end_force_N: float
+    left_N: Array
 
 
 def pulls(force_N: Array, least_N: float) -> bool:
@@ -130,16 +133,14 @@ def _fit(
     by_range = (_basis(x, x0, reach * ratio, shape, exponent) - _basis(x, x0, reach / ratio, shape, exponent)) @ c
     jacobian = np.column_stack([basis, by_range, by_place / (2.0 * step)])
     scale = np.maximum(np.abs(jacobian).max(axis=0), 1e-300)
-    # what no shape meets counts as noise
-    astray = max(chi2 / sigma**2 / max(x.size - jacobian.shape[1], 1), 1.0)
-    covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * sigma**2 * astray
+    covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * sigma**2
     std = min(float(np.sqrt(max(covariance[-1, -1], 0.0))) / scale[-1], span / np.sqrt(12.0))
     depth = deepest - x0
     std = float(np.hypot(std, SUNK * depth))
     if ends:
         std = float(np.hypot(std, UNTOLD * (x0 - edge)))
     rise = float(c[2] * depth**exponent + c[3] * depth ** (exponent + 1.0))
-    return Contact(x0, std, chi2 / sigma**2, exponent, rise)
+    return Contact(x0, std, chi2 / sigma**2, jacobian.shape[1], exponent, rise, force - basis @ c)
 
 
 def _lowest_and_edge(x: Array, force: Array) -> tuple[float, float]:

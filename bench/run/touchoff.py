@@ -30,13 +30,14 @@ MIN_SAMPLES_IN_CONTACT = 4
 @dataclass(frozen=True)
 class Air:
     """The load cell in free air: `mean_N`, `sigma_N` (one sample, trend removed), `drift_N_s`; `moving_N`: by how much
-    more it reads on the way to the pad, where friction is felt."""
+    more it reads on the way to the pad, where friction is felt; `turns_N`: what it changes by where motion turns."""
 
     mean_N: float
     sigma_N: float
     drift_N_s: float
     samples: int
     moving_N: float = 0.0
+    turns_N: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,16 @@ def threshold_N(asked_N: float, air: Air) -> float:
     return air.moving_N + max(asked_N, SIGMAS * air.sigma_N)
 
 
+def turned(force_N: Array, air: Air) -> int:
+    """The first sample of an approach (n,) at which friction has turned round, as a servo that settles lets go of it:
+    three in a row are no more below the level that the first quarter has. 0 where no friction shows."""
+    early = force_N[: force_N.size // 4]
+    if air.turns_N <= 0.0 or early.size < 8:
+        return 0
+    up = early >= np.median(early) - 2.0 * air.sigma_N
+    return int(np.argmax(up[:-2] & up[1:-1] & up[2:]))
+
+
 def find_surface(position_mm: Array, force_N: Array, sigma_N: float, position_sigma_mm: float = 0.0) -> Surface | None:
     """The surface from one approach, at once (see `surface_in_pieces`)."""
     pieces = surface_in_pieces(position_mm, force_N, sigma_N, position_sigma_mm)
@@ -115,22 +126,26 @@ def surface_in_pieces(
     if not np.ptp(position_mm) > 0.0:
         return None
     fits: list[Contact] = []
+    for n in EXPONENTS:
+        fit = yield from _fit_exponent(position_mm, force_N, sigma, n)
+        if fit is not None:
+            fits.append(fit)
     if pulls(force_N, SIGMAS * sigma):
-        fits = yield from contacts_of_a_pull(position_mm, force_N, sigma, MIN_SAMPLES_IN_CONTACT)
-    else:
-        for n in EXPONENTS:
-            fit = yield from _fit_exponent(position_mm, force_N, sigma, n)
-            if fit is not None:
-                fits.append(fit)
+        fits += yield from contacts_of_a_pull(position_mm, force_N, sigma, MIN_SAMPLES_IN_CONTACT)
+    # whoever never felt the pad has no surface to tell
+    fits = [fit for fit in fits if fit.end_force_N > SIGMAS * sigma]
     if not fits:
         return None
-    chi2 = np.array([fit.chi2 for fit in fits])
-    weight = np.exp(-0.5 * (chi2 - chi2.min()))
+    lost = np.array([fit.chi2 + 2.0 * fit.free for fit in fits])
+    top = fits[int(np.argmin(lost))]
+    astray = _astray(top)
+    weight = np.exp(-0.5 * (lost - lost.min()) / astray)
     weight /= weight.sum()
     x0 = np.array([fit.x0_mm for fit in fits])
     mean = float(weight @ x0)
-    variance = float(weight @ (np.array([fit.std_mm for fit in fits]) ** 2 + (x0 - mean) ** 2))
-    top = fits[int(np.argmin(chi2))]
+    within = np.ptp(position_mm) ** 2 / 12.0  # where the data say nothing, still: somewhere within the approach
+    own = np.minimum(np.array([fit.std_mm for fit in fits]) ** 2 * astray, within)
+    variance = float(weight @ (own + (x0 - mean) ** 2))
     depth = float(position_mm.max() - mean)
     return Surface(
         position_mm=mean,
@@ -159,7 +174,7 @@ def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Gene
     x0 = float(grid[best])
     if (x > x0).sum() < MIN_SAMPLES_IN_CONTACT:
         return None
-    chi2, (_, gain, bend) = _cost(x, force, x0, exponent)
+    chi2, (_, gain, bend), left = _cost(x, force, x0, exponent)
     depth = float(x.max()) - x0
     if gain <= 0 or gain + bend * depth <= 0:
         return None
@@ -176,7 +191,20 @@ def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Gene
         return None
     # Where the data say nothing, still: somewhere within the approach, anywhere alike.
     std = min(float(np.sqrt(max(covariance[3, 3], 0.0))) / scale[3], span / np.sqrt(12.0))
-    return Contact(x0, std, chi2 / sigma**2, exponent, gain * depth**exponent + bend * depth ** (exponent + 1.0))
+    end_force_N = gain * depth**exponent + bend * depth ** (exponent + 1.0)
+    return Contact(x0, std, chi2 / sigma**2, 4, exponent, end_force_N, left)
+
+
+def _astray(fit: Contact) -> float:
+    """What the samples weigh less for what no fit meets (cogging, friction that turns round), a factor on variances: it
+    counts as noise that stays for as many samples as it is alike. 1 where noise is all that is left."""
+    n = fit.left_N.size
+    power = np.abs(np.fft.rfft(fit.left_N, 2 * n)) ** 2
+    alike = np.fft.irfft(power)[:n]
+    turns = np.flatnonzero(alike < 0.0)
+    until = int(turns[0]) if turns.size else n
+    stays = max(1.0, 2.0 * float(alike[:until].sum() / alike[0]) - 1.0) if alike[0] > 0 else 1.0
+    return max(fit.chi2 / max(n - fit.free, 1) * stays, 1.0)
 
 
 def _costs(x: Array, force: Array, x0: Array, exponent: float) -> Array:
@@ -197,10 +225,10 @@ def _costs(x: Array, force: Array, x0: Array, exponent: float) -> Array:
     return np.asarray(f @ f - np.where(both, two, one))
 
 
-def _cost(x: Array, force: Array, x0: float, exponent: float) -> tuple[float, Array]:
-    """Sum of squares and the linear coefficients (level, k, k'); shape of x and force (n,)."""
+def _cost(x: Array, force: Array, x0: float, exponent: float) -> tuple[float, Array, Array]:
+    """Sum of squares, the linear coefficients (level, k, k'), and what is left; shape of x and force (n,)."""
     r = np.maximum(x - x0, 0.0)
     basis = np.column_stack([np.ones_like(x), r**exponent, r ** (exponent + 1.0)])
     coefficients, *_ = np.linalg.lstsq(basis, force, rcond=None)
     rest = force - basis @ coefficients
-    return float(rest @ rest), np.asarray(coefficients, dtype=np.float64)
+    return float(rest @ rest), np.asarray(coefficients, dtype=np.float64), rest

@@ -24,6 +24,9 @@ def test_the_surface_is_found_behind_friction(tmp_path, base, coulomb):
     tare, touch = done.events("tare")[0].data, done.events("touch_off")[0].data
     assert tare["friction_turns_N"] == pytest.approx(2.0 * coulomb, abs=0.03)
     assert touch["surface_mm"] == pytest.approx(done.world.surface_mm, abs=0.04)
+    assert abs(touch["surface_mm"] - done.world.surface_mm) < 4.0 * touch["surface_std_mm"]
+    # not told by half as it turns round
+    assert touch["surface_std_mm"] < 0.03
 
 
 def test_a_touch_is_told_beside_friction(tmp_path):

@@ -82,6 +82,30 @@ def test_where_a_pull_is_there_at_once_the_surface_is_within_its_range():
     assert np.median(np.abs(errors)) < 0.03
 
 
+def test_a_wave_in_the_air_is_no_pull_and_the_doubt_knows_of_it():
+    """Cogging: no shape of a pull meets it, and what none meets is doubt."""
+    z, stated = [], []
+    for seed in range(20):
+        x, force, truth = approach(seed)
+        phase = np.random.default_rng(seed + 1000).uniform(0.0, 2.0 * np.pi)
+        found = find_surface(x, force + 0.04 * np.sin(2.0 * np.pi * x / 0.06 + phase), SIGMA_N)
+        if found is not None:
+            z.append((found.position_mm - truth) / found.std_mm)
+            stated.append(found.std_mm)
+    assert np.mean(np.abs(z) < 3) >= 0.9, z
+    assert np.median(stated) > 0.005
+
+
+@pytest.mark.parametrize("gain", [-1.0, 0.0])
+def test_a_force_that_never_rises_tells_no_surface(gain):
+    """A cell wired the wrong way shows a pad that pulls ever more."""
+    for seed in range(12):
+        x, force, truth = approach(seed)
+        noise = np.random.default_rng(seed + 1000).normal(0.0, SIGMA_N, x.size)
+        found = find_surface(x, gain * force + noise, SIGMA_N)
+        assert found is None or found.std_mm > 0.02
+
+
 def test_known_exponent_reaches_the_bound():
     """On a straight contact line, not knowing the exponent costs at most a factor 5 over who knows that it is 1."""
     rng = np.random.default_rng(5)
