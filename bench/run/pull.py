@@ -47,9 +47,6 @@ UNTOLD = 0.3
 SUNK = 0.03
 """Of the depth of an approach, that the touch before it may have left: noise alone tells the turn to less than that."""
 
-AT_ONCE = 5
-"""Fits between two turns of a motor's loop."""
-
 
 @dataclass(frozen=True)
 class Contact:
@@ -110,24 +107,24 @@ def _fit(
     ranges = np.geomspace(SHORTEST * span, LONGEST * span, RANGES)
     best = np.inf, float(places[0]), float(ranges[0]), np.zeros(4)
     for _ in range(ROUNDS):
-        done = 0
         for x0 in places.tolist():
-            for reach in [max(x0 - edge, 1e-9)] if ends else ranges.tolist():
-                chi2, c = _cost(force, _basis(x, x0, reach, shape, exponent))
-                depth = deepest - x0
-                if chi2 < best[0] and c[1] > 0 and c[2] > 0 and c[2] + c[3] * depth > 0:
-                    best = chi2, x0, reach, c
-                done += 1
-                if done % AT_ONCE == 0:
-                    yield
+            reaches = np.array([max(x0 - edge, 1e-9)]) if ends else ranges
+            costs, c = _costs(x, force, x0, reaches, shape, exponent)
+            yield
+            depth = deepest - x0
+            sane = (c[:, 1] > 0) & (c[:, 2] > 0) & (c[:, 2] + c[:, 3] * depth > 0)
+            at = int(np.argmin(np.where(sane, costs, np.inf)))
+            if sane[at] and costs[at] < best[0]:
+                best = float(costs[at]), x0, float(reaches[at]), c[at]
         if not np.isfinite(best[0]):
             return None
         apart = float(ranges[1] / ranges[0])
         places = np.linspace(best[1] - near, best[1] + near, 9)
         places, near = places[places < most], 0.3 * near
         ranges = best[2] * apart ** np.linspace(-1.0, 1.0, 5)
-    chi2, x0, reach, c = best
+    _, x0, reach, c = best
     basis = _basis(x, x0, reach, shape, exponent)
+    left = force - basis @ c
     step, ratio = 1e-3 * span, 1.02
     by_place = (_basis(x, x0 + step, reach, shape, exponent) - _basis(x, x0 - step, reach, shape, exponent)) @ c
     by_range = (_basis(x, x0, reach * ratio, shape, exponent) - _basis(x, x0, reach / ratio, shape, exponent)) @ c
@@ -140,7 +137,7 @@ def _fit(
     if ends:
         std = float(np.hypot(std, UNTOLD * (x0 - edge)))
     rise = float(c[2] * depth**exponent + c[3] * depth ** (exponent + 1.0))
-    return Contact(x0, std, chi2 / sigma**2, jacobian.shape[1], exponent, rise, force - basis @ c)
+    return Contact(x0, std, float(left @ left) / sigma**2, jacobian.shape[1], exponent, rise, left)
 
 
 def _lowest_and_edge(x: Array, force: Array) -> tuple[float, float]:
@@ -159,11 +156,22 @@ def _basis(x: Array, x0: float, reach: float, shape: Callable[[Array], Array], e
     return np.column_stack([np.ones_like(x), -shape(np.maximum(x0 - x, 0.0) / reach), rise, rise * r])
 
 
-def _cost(force: Array, basis: Array) -> tuple[float, Array]:
-    """Sum of squares and the coefficients."""
-    scale = np.maximum(np.sqrt((basis * basis).sum(axis=0)), 1e-300)
-    unit = basis / scale
-    normal = unit.T @ unit + 1e-12 * np.eye(unit.shape[1])
-    c = np.linalg.solve(normal, unit.T @ force)
-    rest = force - unit @ c
-    return float(rest @ rest), np.asarray(c / scale)
+def _costs(
+    x: Array, force: Array, x0: float, reaches: Array, shape: Callable[[Array], Array], exponent: float
+) -> tuple[Array, Array]:
+    """Sums of squares (m,) and coefficients as of `_basis` (m, 4) of one surface and ranges of the pull (m,)."""
+    r = np.maximum(x - x0, 0.0)
+    rise = r**exponent
+    fixed = np.vstack([np.ones_like(x), rise, rise * r])
+    pull = -shape(np.maximum(x0 - x, 0.0) / reaches[:, None])
+    normal = np.empty((reaches.size, 4, 4))
+    others = np.array([0, 2, 3])
+    normal[:, others[:, None], others] = fixed @ fixed.T
+    normal[:, 1, others] = normal[:, others, 1] = pull @ fixed.T
+    normal[:, 1, 1] = (pull * pull).sum(axis=1)
+    right = np.empty((reaches.size, 4))
+    right[:, others], right[:, 1] = fixed @ force, pull @ force
+    scale = np.maximum(np.sqrt(np.einsum("mii->mi", normal)), 1e-300)
+    unit = normal / (scale[:, :, None] * scale[:, None, :]) + 1e-12 * np.eye(4)
+    c = np.linalg.solve(unit, (right / scale)[..., None])[..., 0] / scale
+    return np.asarray(force @ force - (c * right).sum(axis=1)), np.asarray(c)
