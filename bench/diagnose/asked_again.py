@@ -11,7 +11,7 @@ from bench.felt_motion import resolution
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 
-from .channel import FEW, Faults, not_of_the_motion, of_the_model, resting, runs, standing_off, strays
+from .channel import FEW, Faults, far, not_of_the_motion, of_the_model, resting, runs, standing_off, strays
 from .data import Prepared, prepare
 from .path import Path
 from .pulses import pulses
@@ -134,6 +134,10 @@ def _strays_again(
         rest &= ~further
     if strays(m, errors, outlier & ~at_rest):  # where they crowd, some show only once the others are gone
         crowded = standing_off(told, known & ~outlier, suspect, step_N)
+        # of a burst in which hardly a sample is right none is far from its neighbours
+        beyond = known & (np.abs(errors) > far(errors[known & ~outlier & ~crowded]))
+        if strays(m, errors, (outlier | crowded | beyond) & ~at_rest):
+            crowded |= beyond & ~at_rest
         outlier |= crowded
         rest &= ~crowded
     rest &= ~(pulsed | further & at_rest)  # what stands off alone in a hold is no transient, whatever the model is

@@ -113,7 +113,8 @@ def tare(loop: Loop, mover: Mover, approach: Approach | None, slow_mm_s: float, 
         if fall > touch + rubs_N:
             raise Stopped(
                 f"the probe already touches something: the force fell by {fall:.3f} N when it backed off "
-                f"{backed_mm:.2f} mm (threshold {touch:.3f} N); retract the probe (or lower the pad) and start again"
+                f"{backed_mm:.2f} mm (threshold {touch:.3f} N); retract the probe (or lower the pad) and start again. "
+                "Where nothing is there, the bench's own force changes along its travel: raise approach.force above it"
             )
         air = replace(air, moving_N=moving_N, turns_N=rubs_N)
     # a servo that settles creeps within what friction needs to turn round
