@@ -93,8 +93,8 @@ def test_csv_is_taken_as_it_is(fitted, tmp_path, capsys):
     ("hidden", "known"),
     [
         ([{"id": "friction", "coulomb": 0.15}], [{"id": "friction", "coulomb": 0.1}]),
-        ([{"id": "mains_hum", "amplitude": 0.06, "frequency": 50.1}], []),
-        ([{"id": "force_bias", "bias": 0.08}], []),
+        pytest.param([{"id": "mains_hum", "amplitude": 0.06, "frequency": 50.1}], [], marks=pytest.mark.long),
+        pytest.param([{"id": "force_bias", "bias": 0.08}], [], marks=pytest.mark.long),
     ],
     ids=["friction", "hum", "bias"],
 )

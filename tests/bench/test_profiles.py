@@ -81,6 +81,7 @@ def test_a_hop_of_a_coarse_scale_is_no_move() -> None:
     assert [round(move.way_mm, 1) for _, _, move in told.planned] == [1.0]
 
 
+@pytest.mark.long
 def test_a_mass_is_told_right_where_the_servo_smooths_the_moves() -> None:
     ratios = []
     for seed in range(5):

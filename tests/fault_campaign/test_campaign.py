@@ -14,7 +14,12 @@ SEEDS = 200
 IN_ONE_TEST = 20
 
 
-@pytest.mark.parametrize("first", range(0, SEEDS, IN_ONE_TEST))
+FIRST_OF_TEST = range(0, SEEDS, IN_ONE_TEST)
+
+
+@pytest.mark.parametrize(
+    "first", [*FIRST_OF_TEST[:4], *(pytest.param(s, marks=pytest.mark.long) for s in FIRST_OF_TEST[4:])]
+)
 def test_what_never_bends(first):
     verdicts = [judge(seed) for seed in range(first, first + IN_ONE_TEST)]
     failed = [f"seed {v.seed}: {'; '.join(v.wrong)}\n{draw(v.seed).text()}" for v in verdicts if v.wrong]

@@ -59,7 +59,7 @@ def test_a_bench_in_order_is_well_and_every_figure_is_there(padbench, monkeypatc
     assert not worlds[0].plant.servo_on
 
 
-@pytest.mark.parametrize("late_s", [0.0, 0.004])
+@pytest.mark.parametrize("late_s", [pytest.param(0.0, marks=pytest.mark.long), 0.004])
 def test_the_delay_in_a_pad_is_the_true_one(padbench, tmp_path, late_s):
     effects = [{"id": "force_delay", "delay": late_s}] if late_s else []
     path = bench_file(tmp_path, simulation={"pad": pad_file(tmp_path, *effects)})

@@ -52,7 +52,14 @@ def test_what_is_believed_already_is_not_found_again(id, shape, rate_Hz, off):
     assert names.count("consistent") >= len(SEEDS) - 1, names
 
 
-@pytest.mark.parametrize(("id", "shape"), [("mains_hum", "sine"), ("outliers", "single"), ("saturation", "hard")])
+@pytest.mark.parametrize(
+    ("id", "shape"),
+    [
+        ("mains_hum", "sine"),
+        pytest.param("outliers", "single", marks=pytest.mark.long),
+        pytest.param("saturation", "hard", marks=pytest.mark.long),
+    ],
+)
 def test_a_fault_of_the_channel_that_is_believed_is_not_told_as_missing(id, shape):
     c = draw_case(0, (id,), 1.0, shape, protocol="staircase", rate_hz=240.0, jitter="none", own_clock=False)
     m = measurement(c)

@@ -34,7 +34,7 @@ def begun(c: Case) -> tuple[Search, Fit]:
     return search, search.base([structure.pad.x()])
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_a_form_whose_valley_is_apart_from_the_best_ones_is_found(seed):
     """From where a joint that opens has ended no way leads to one that has closed."""
     c = draw_case(seed, ("frame_compliance",), 2.5, "joint_closes", protocol="rich", rate_hz=150.0, jitter="none")
@@ -166,7 +166,7 @@ def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
         assert stage[0].fit.chi2 < stage[2].before and id not in {rival.id for rival in stage[1]}
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_rivals_stand_against_what_the_fit_before_left_in_the_same_units(seed):
     """Once the noise's colour is in the cost, the path's fits have another χ² than those that were compared."""
     c = draw_case(seed, ("viscous_damping",), 2.5, "linear", protocol="rich", rate_hz=300.0, jitter="none",

@@ -21,7 +21,7 @@ SHARES, RATES = (0.25, 0.15), (4.0, 0.35)
     [(Exponential(2.24, 0.69), None), (Power(1.7, 0.8), None), (Polynomial((0.0, 2.0, -0.3, 0.5)), 3)],
     ids=["exponential", "power", "polynomial"],
 )
-@pytest.mark.parametrize("contact", ["bonded", "unilateral"])
+@pytest.mark.parametrize("contact", [pytest.param("bonded", marks=pytest.mark.long), "unilateral"])
 def test_the_structure_the_data_were_made_with_is_chosen(law, degree, contact) -> None:
     right = 0
     for seed in range(3):

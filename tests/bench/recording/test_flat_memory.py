@@ -29,6 +29,7 @@ MOST_BYTES = 2.0
 """A sample. An entry of the index kept as an object would be 80; a number kept of each sample at least 8."""
 
 
+@pytest.mark.long
 def test_minutes_at_100_Hz_cost_no_memory_a_sample(tmp_path, monkeypatch):
     monkeypatch.setattr(spool, "IN_MEMORY", 4096)
     protocol_file, bench_file = write_files(tmp_path, RUN_S / 3600.0)

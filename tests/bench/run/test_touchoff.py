@@ -42,7 +42,7 @@ def approach(seed: int, pull: Callable[[np.ndarray], np.ndarray] = no_pull) -> t
 
 def test_error_and_stated_deviation_agree():
     errors, stated = [], []
-    for seed in range(100):
+    for seed in range(60):
         x, force, truth = approach(seed)
         found = find_surface(x, force, SIGMA_N)
         assert found is not None
@@ -99,7 +99,7 @@ def test_a_wave_in_the_air_is_no_pull_and_the_doubt_knows_of_it():
 @pytest.mark.parametrize("gain", [-1.0, 0.0])
 def test_a_force_that_never_rises_tells_no_surface(gain):
     """A cell wired the wrong way shows a pad that pulls ever more."""
-    for seed in range(12):
+    for seed in range(6):
         x, force, truth = approach(seed)
         noise = np.random.default_rng(seed + 1000).normal(0.0, SIGMA_N, x.size)
         found = find_surface(x, gain * force + noise, SIGMA_N)

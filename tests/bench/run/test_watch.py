@@ -299,7 +299,14 @@ def hastened(name: str) -> dict[str, Any]:
     return protocol
 
 
-@pytest.mark.parametrize("name", sorted(shipped_names("protocol")))
+ALIKE = {"sweep", "long_hold", "precondition"}
+"""Of moves that the others have too."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.long] if n in ALIKE else []) for n in sorted(shipped_names("protocol"))],
+)
 def test_no_alarm_on_shipped_protocols(tmp_path, name):
     """What a bench has of friction and moving mass is no reason to stop."""
     pad = yaml.safe_load(find_file("pad", "polyurethane").read_text("utf-8"))
