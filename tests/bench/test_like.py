@@ -109,6 +109,7 @@ def test_the_model_of_a_diagnosis_reproduces_its_error(tmp_path, hidden, known):
     assert likeness(told.model, measured).rmse_N == pytest.approx(told.rmse_after, rel=0.01)
 
 
+@pytest.mark.long
 def test_what_a_model_says_of_the_tare_counts_as_zero(fitted):
     """A pad with a bias in its cell answers as the one without: the tare took it away."""
     done, _, _ = fitted

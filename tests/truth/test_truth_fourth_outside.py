@@ -45,6 +45,7 @@ def test_a_fan_comes_and_goes_and_a_pump_has_strokes():
     assert 0.06 < np.std(np.diff(begins)) * told["frequency"] < 0.14
 
 
+@pytest.mark.long
 def test_a_sense_wire_changes_the_gain_and_not_the_zero():
     motion = Path(-0.5).to(1.0, 50.0).hold(60.0).to(-0.5, 50.0).hold(5.0).motion()
     fine, told, _ = hidden("sense_wire", "two_level", motion=motion)
@@ -123,6 +124,7 @@ def test_a_loose_screw_has_another_zero_after_each_move():
     assert len(steps) == 2 and steps[0] > 0.7  # not after the slow one
 
 
+@pytest.mark.long
 def test_a_loose_head_leads_the_loop_astray():
     motion = Path(1.0).hold(2000.0).motion()
     fine, told, _ = hidden("loose_head", "wanders", motion=motion)

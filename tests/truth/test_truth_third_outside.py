@@ -88,6 +88,7 @@ def test_a_display_is_calm_within_its_band():
     assert set(latched) == {0.0, 5.0}
 
 
+@pytest.mark.long
 def test_a_zero_that_comes_back():
     t = np.arange(0, 1500, 0.05)
     for shape, near in (("reverting", 0.12), ("flicker", 0.3)):

@@ -77,6 +77,7 @@ def padbench(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=100, cwd=cwd, env=env, check=False)
 
 
+@pytest.mark.long
 def test_a_second_run_and_every_other_command_are_refused_while_one_is_going_on(tmp_path):
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()

@@ -182,6 +182,7 @@ def test_two_series_on_one_list_do_not_measure_together(padbench, tmp_path, monk
     assert statuses(path) == {"pad-1": "done"}
 
 
+@pytest.mark.long
 def test_every_pad_is_fitted_with_the_structure_of_the_list(padbench, tmp_path):
     """Of its own this pad is found to have another: pads compare in one structure only."""
     path = list_file(tmp_path, samples=PADS[:1], law="power", order=1, contact="bonded")

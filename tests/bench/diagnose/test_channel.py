@@ -316,7 +316,7 @@ def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
         assert np.std(line.force_N(t, np.zeros(len(t))) - clean) < 1.5e-3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_line_is_told_by_the_times_at_which_forces_were_felt():
     """A clock that gains 200 microseconds a second turns a hum by half a wave within a minute of its stamps."""
     for seed in (1, 2):

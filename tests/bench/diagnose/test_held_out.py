@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from bench.diagnose import diagnose, held_out
 from bench.diagnose.channel import faults, not_of_the_motion
 from bench.diagnose.data import prepare
@@ -33,6 +35,7 @@ def test_a_block_with_the_greatest_forces_is_not_predicted_by_a_limit_that_the_o
     assert sum(w > 1.5 for w in worse) >= 2, worse
 
 
+@pytest.mark.long
 def test_a_ceiling_that_bends_the_force_towards_it_is_one_cause():
     """What the samples at the ceiling do not tell, the model does: how the force bends below it."""
     for seed in range(2):

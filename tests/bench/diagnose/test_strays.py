@@ -39,6 +39,7 @@ def test_strays_in_moves_are_told_once_the_model_is_right_beside_them(size):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_what_a_motion_makes_in_a_sample_or_two_is_no_stray():
     for _, found in said("resonance", "second_order", 1.0, "staircase", 120.0):
         assert found.causes and found.causes[0].id == "resonance"

@@ -44,6 +44,7 @@ def test_a_fit_comes_out(name: str) -> None:
         assert "does not describe" in sentence(result)
 
 
+@pytest.mark.long
 def test_the_page_is_made(tmp_path: Path) -> None:
     (data,) = (s for s in SETS if s.folder == "muscle_ramp_hold")
     real_data.write(DATA, tmp_path, [data])

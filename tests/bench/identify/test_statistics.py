@@ -71,6 +71,7 @@ def test_standard_errors_cover() -> None:
     assert 0.88 < np.mean(inside) <= 1.0
 
 
+@pytest.mark.long
 def test_standard_errors_cover_under_coloured_noise() -> None:
     inside = [abs(error) < 1.96 * std for one in draws(0.03) for error, std, _ in told(one)]
     assert np.mean(inside) > 0.83

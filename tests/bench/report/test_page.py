@@ -155,6 +155,7 @@ def test_a_users_matplotlib_settings_neither_reach_the_page_nor_are_changed(run:
         assert dict(mpl.rcParams) == before
 
 
+@pytest.mark.long
 def test_long_and_noisy_recordings_stay_under_two_megabytes(tmp_path: Path) -> None:
     random = np.random.default_rng(3)
     run = samples.recording(2500.0, 2500.0)

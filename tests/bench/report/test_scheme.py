@@ -67,7 +67,7 @@ def test_over_sample_times_both_panels_and_what_was_refused():
     assert "T = 0.00100 s: shorter than the samples" in seen.shown
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_discrete_fit_is_repeated_at_other_sample_times():
     m = measurement(steps())
     result = fit(m, method="iv", law="exponential", order=2, sample_time=0.02)
