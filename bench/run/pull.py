@@ -131,7 +131,7 @@ def _fit(
     jacobian = np.column_stack([basis, by_range, by_place / (2.0 * step)])
     scale = np.maximum(np.abs(jacobian).max(axis=0), 1e-300)
     covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * sigma**2
-    std = min(float(np.sqrt(max(covariance[-1, -1], 0.0))) / scale[-1], span / np.sqrt(12.0))
+    std = float(np.sqrt(max(covariance[-1, -1], 0.0))) / scale[-1]
     depth = deepest - x0
     std = float(np.hypot(std, SUNK * depth))
     if ends:

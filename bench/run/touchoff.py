@@ -143,7 +143,7 @@ def surface_in_pieces(
     weight /= weight.sum()
     x0 = np.array([fit.x0_mm for fit in fits])
     mean = float(weight @ x0)
-    within = np.ptp(position_mm) ** 2 / 12.0  # where the data say nothing, still: somewhere within the approach
+    within = np.ptp(position_mm) ** 2 / 12.0  # where the data say nothing: anywhere there alike
     own = np.minimum(np.array([fit.std_mm for fit in fits]) ** 2 * astray, within)
     variance = float(weight @ (own + (x0 - mean) ** 2))
     depth = float(position_mm.max() - mean)
@@ -189,8 +189,7 @@ def _fit_exponent(x: Array, force: Array, sigma: float, exponent: float) -> Gene
         covariance = np.linalg.inv(normal) * sigma**2
     except np.linalg.LinAlgError:
         return None
-    # Where the data say nothing, still: somewhere within the approach, anywhere alike.
-    std = min(float(np.sqrt(max(covariance[3, 3], 0.0))) / scale[3], span / np.sqrt(12.0))
+    std = float(np.sqrt(max(covariance[3, 3], 0.0))) / scale[3]
     end_force_N = gain * depth**exponent + bend * depth ** (exponent + 1.0)
     return Contact(x0, std, chi2 / sigma**2, 4, exponent, end_force_N, left)
 

@@ -14,6 +14,7 @@ SEEDS = 200
 IN_ONE_TEST = 20
 
 EVERY_DAY = 40
+"""Seeds below it; those beyond are of the long tests."""
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ def pressed_once(id: str, seed: int) -> Diagnosis:
 
 @pytest.mark.slow
 def test_one_press_names_nothing_surely_that_acts_with_the_motion():
-    told = [pressed_once(id, 1) for id in ("friction", "inertia")]
+    told = [pressed_once(id, 1) for id in ("friction", "cogging", "inertia")]
     sure = [confidence for d in told for confidence in of_motion(d)]
     assert sure and max(sure) <= 0.5
     assert all(d.seen_once == bool(of_motion(d)) for d in told)

@@ -42,7 +42,7 @@ def approach(seed: int, pull: Callable[[np.ndarray], np.ndarray] = no_pull) -> t
 
 def test_error_and_stated_deviation_agree():
     errors, stated = [], []
-    for seed in range(60):
+    for seed in range(100):
         x, force, truth = approach(seed)
         found = find_surface(x, force, SIGMA_N)
         assert found is not None
