@@ -92,7 +92,9 @@ def test_csv_is_taken_as_it_is(fitted, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("hidden", "known"),
     [
-        ([{"id": "friction", "coulomb": 0.15}], [{"id": "friction", "coulomb": 0.1}]),
+        pytest.param(
+            [{"id": "friction", "coulomb": 0.15}], [{"id": "friction", "coulomb": 0.1}], marks=pytest.mark.long
+        ),
         pytest.param([{"id": "mains_hum", "amplitude": 0.06, "frequency": 50.1}], [], marks=pytest.mark.long),
         pytest.param([{"id": "force_bias", "bias": 0.08}], [], marks=pytest.mark.long),
     ],

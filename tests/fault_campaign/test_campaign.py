@@ -13,7 +13,7 @@ from tests.faults.faulty import bench_with, press
 SEEDS = 200
 IN_ONE_TEST = 20
 
-EVERY_DAY = 40
+EVERY_DAY = 20
 """Seeds below it; those beyond are of the long tests."""
 
 

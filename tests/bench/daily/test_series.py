@@ -26,7 +26,7 @@ from bench.daily.series_table import rows
 from bench.errors import InputError, Refused
 from bench.preflight import check
 from bench.recording import read_recording
-from tests.bench.run.benches import SHORT, bench_file, protocol_file
+from tests.bench.run.benches import AIR, SHORT, bench_file, protocol_file
 
 PADS = [{"id": "pad-1", "thickness": 3.2}, {"id": "pad 2", "note": "soft"}, {"id": "pad-3"}]
 
@@ -165,6 +165,7 @@ def test_a_run_that_was_measured_and_not_analysed_is_analysed_when_the_series_go
 def test_two_series_on_one_list_do_not_measure_together(padbench, tmp_path, monkeypatch):
     """The second begins while the first measures its first pad."""
     path, begun, inside = list_file(tmp_path, samples=PADS[:1]), work.run_protocol, []
+    protocol_file(tmp_path, AIR)
 
     def slow(*given, **options):
         monkeypatch.setattr(work, "run_protocol", begun)

@@ -101,7 +101,9 @@ def test_a_value_that_comes_twice_for_a_while_sticks_in_a_coarse_channel_too():
         assert recall > 0.95
 
 
-@pytest.mark.parametrize("kind", ["white", "coloured", "quantised", "heavy"])
+@pytest.mark.parametrize(
+    "kind", ["white", *(pytest.param(k, marks=pytest.mark.long) for k in ("coloured", "quantised", "heavy"))]
+)
 def test_a_ceiling_that_gives_way_is_a_ceiling(kind):
     """Its samples follow each other without noise, and none of them is the greatest twice."""
     said, true = [], []
@@ -119,7 +121,9 @@ def test_a_ceiling_that_gives_way_is_a_ceiling(kind):
     assert recall > 0.8
 
 
-@pytest.mark.parametrize("kind", ["white", "coloured", "quantised", "heavy"])
+@pytest.mark.parametrize(
+    "kind", ["white", *(pytest.param(k, marks=pytest.mark.long) for k in ("coloured", "quantised", "heavy"))]
+)
 def test_below_a_ceiling_that_is_not_sharp_the_force_is_not_trusted(kind):
     """From where the force is bent by 1 % of the ceiling on; below a sharp one all but little is."""
     said, true = [], []
@@ -289,7 +293,14 @@ def test_a_line_that_grows_with_the_load_is_stated_at_the_mean_force():
         assert np.std(e - line.force_N(t, load)) == pytest.approx(0.01, rel=0.03)
 
 
-@pytest.mark.parametrize("shape", ["sine", "odd harmonics", "one way", "swells", "wanders", "let through late"])
+@pytest.mark.parametrize(
+    "shape",
+    [
+        "odd harmonics",
+        "swells",
+        *(pytest.param(s, marks=pytest.mark.long) for s in ("sine", "one way", "wanders", "let through late")),
+    ],
+)
 def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
     for seed in SEEDS:
         rng = np.random.default_rng(seed)

@@ -60,7 +60,9 @@ def test_json_alone_on_standard_output(padbench, friction):
     assert finite(said.out)["causes"][0]["id"] == "friction"
 
 
-@pytest.mark.parametrize("id", ["sensor_lag", pytest.param("outliers", marks=pytest.mark.long), "contact_offset"])
+@pytest.mark.parametrize(
+    "id", ["sensor_lag", *(pytest.param(id, marks=pytest.mark.long) for id in ("outliers", "contact_offset"))]
+)
 def test_the_extended_model_reproduces_the_error(id):
     c, d = diagnosed(id)
     assert likeness(d.model, measurement(c)).rmse_N == pytest.approx(d.rmse_after, rel=0.01)

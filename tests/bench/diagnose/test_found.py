@@ -61,11 +61,11 @@ def test_every_id_is_in_one_group():
     assert sorted(id for ids in GROUPS.values() for id in ids) == sorted(CATALOGUE)
 
 
-@pytest.mark.parametrize("turn", [0, *(pytest.param(turn, marks=pytest.mark.long) for turn in (1, 2))])
+@pytest.mark.parametrize("turn", [0, *(pytest.param(turn, marks=pytest.mark.long) for turn in (1, 2, 3))])
 @pytest.mark.parametrize("group", GROUPS)
 def test_hidden_effects_are_named(group, turn, tmp_path):
-    """Every third one of a group; the rest of it takes twice as long again."""
-    asked = GROUPS[group][turn::3]
+    """Every fourth one of a group; the rest of it takes three times as long again."""
+    asked = GROUPS[group][turn::4]
     ids = [id for id in asked if misfit(hidden(id)).detectable]
     assert len(ids) >= len(asked) - 1  # else the set judges nothing
     said = {id: diagnosed(case := hidden(id), case.write(tmp_path / id))["said"] for id in ids}
@@ -96,6 +96,7 @@ def test_found_through_the_wire(tmp_path, padbench):
     assert abs(number["value"] - 0.02) <= max(0.002, 2 * number["std"])
 
 
+@pytest.mark.long
 def test_a_clean_run_is_consistent_on_a_slow_bench(tmp_path, padbench):
     folder: Path = run(tmp_path, "quick", "simulated_laumas", simulation={"seed": 7}).folder
     assert padbench("diagnose", folder, "--model", "polyurethane", "--json", tmp_path / "said.json").status == 0

@@ -36,7 +36,7 @@ def known(c: Case, **off: float) -> Model:
     [
         ("friction", "coulomb", 120.0, {"coulomb": 0.8}),
         pytest.param("inertia", "rigid", 300.0, {"mass": 1.2}, marks=pytest.mark.long),
-        ("encoder_error", "reported", 120.0, {"amplitude": 1.1}),
+        pytest.param("encoder_error", "reported", 120.0, {"amplitude": 1.1}, marks=pytest.mark.long),
         pytest.param("cogging", "sine", 120.0, {"amplitude": 1.1}, marks=pytest.mark.long),
     ],
 )

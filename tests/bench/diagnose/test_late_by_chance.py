@@ -40,7 +40,9 @@ def test_the_scatter_of_a_delay_is_told_beside_a_delay_and_beside_a_lag() -> Non
     assert np.median(ratios) == pytest.approx(1.0, abs=0.15) and min(ratios) > 0.6 and max(ratios) < 1.5, ratios
 
 
-@pytest.mark.parametrize("id", ["force_delay", pytest.param("sensor_lag", marks=pytest.mark.long), "friction"])
+@pytest.mark.parametrize(
+    "id", ["force_delay", *(pytest.param(id, marks=pytest.mark.long) for id in ("sensor_lag", "friction"))]
+)
 def test_what_is_late_by_a_rule_or_not_at_all_does_not_scatter(id: str) -> None:
     for seed in SEEDS:
         case = draw_case(seed, (id,), 1.5, protocol="rich", rate_hz=400.0, jitter="none")

@@ -34,7 +34,8 @@ def begun(c: Case) -> tuple[Search, Fit]:
     return search, search.base([structure.pad.x()])
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 3])
 def test_a_form_whose_valley_is_apart_from_the_best_ones_is_found(seed):
     """From where a joint that opens has ended no way leads to one that has closed."""
     c = draw_case(seed, ("frame_compliance",), 2.5, "joint_closes", protocol="rich", rate_hz=150.0, jitter="none")

@@ -27,7 +27,8 @@ def said(id: str, shape: str, size: float, protocol: str, rate_Hz: float) -> lis
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [1.0, pytest.param(2.5, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("size", [1.0, 2.5])
 def test_strays_in_moves_are_told_once_the_model_is_right_beside_them(size):
     """At the larger size hardly a sample of some bursts is right."""
     right = 0

@@ -195,9 +195,10 @@ def test_quantised_and_noise_free_data_do_not_stick():
     assert of_data(rows(0, noise_N=0.0, noise_mm=0.0)) == []
 
 
-def test_clocks_that_agree_are_not_doubted_on_any_pad_or_motion():
+@pytest.mark.parametrize("seeds", [range(10), pytest.param(range(10, 35), marks=pytest.mark.long)])
+def test_clocks_that_agree_are_not_doubted_on_any_pad_or_motion(seeds):
     looked = 0
-    for seed in range(25):
+    for seed in seeds:
         rng = np.random.default_rng([5, seed])
         drawn = draw.pad(rng)
         motion = draw.motion(rng, drawn.depth_mm, [draw.MOTIONS[seed % len(draw.MOTIONS)]])
@@ -210,7 +211,7 @@ def test_clocks_that_agree_are_not_doubted_on_any_pad_or_motion():
         looked += bool(
             clocks_note(replace(late, force_time_s=late.force_time_s[cut], force_N=late.force_N[cut]), noise)
         )
-    assert looked >= 15  # a quarter of a second is seen on most; slow or holdless motion cannot show it
+    assert looked >= 0.6 * len(seeds)  # a quarter of a second is seen on most; slow or holdless motion cannot show it
 
 
 def loaded(seed: int) -> Rows:

@@ -18,7 +18,11 @@ SHARES, RATES = (0.25, 0.15), (4.0, 0.35)
 
 @pytest.mark.parametrize(
     ("law", "degree"),
-    [(Exponential(2.24, 0.69), None), (Power(1.7, 0.8), None), (Polynomial((0.0, 2.0, -0.3, 0.5)), 3)],
+    [
+        (Exponential(2.24, 0.69), None),
+        pytest.param(Power(1.7, 0.8), None, marks=pytest.mark.long),
+        (Polynomial((0.0, 2.0, -0.3, 0.5)), 3),
+    ],
     ids=["exponential", "power", "polynomial"],
 )
 @pytest.mark.parametrize("contact", [pytest.param("bonded", marks=pytest.mark.long), "unilateral"])

@@ -31,6 +31,9 @@ SHORT: dict[str, Any] = {
 }
 """Some six seconds of bench time."""
 
+AIR: dict[str, Any] = {"name": "air", "approach": "none", "limits": {"force": 12}, "steps": SHORT["steps"]}
+"""The same without a pad, of which nothing is fitted."""
+
 Hook = Callable[[float, str], None]
 
 

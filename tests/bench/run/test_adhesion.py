@@ -10,7 +10,7 @@ from tests.bench.run.benches import run
 
 
 @pytest.mark.parametrize("base", ["simulated", "simulated_iai", "simulated_balance"])
-@pytest.mark.parametrize("form", ["exponential", "van_der_waals"])
+@pytest.mark.parametrize("form", ["exponential", pytest.param("van_der_waals", marks=pytest.mark.long)])
 def test_the_surface_of_a_sticky_pad_is_found(tmp_path, base, form):
     pad = yaml.safe_load(find_file("pad", "polyurethane").read_text("utf-8"))
     sticky = {"id": "adhesion", "form": form, "pull_off": 0.15, "range": 0.1}

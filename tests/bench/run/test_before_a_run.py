@@ -14,7 +14,7 @@ from bench.recording import left_behind, read_recording
 from bench.recording.space import RESERVE
 from bench.run.runner import Notes, run_protocol
 from tests.bench.recording.test_unfinished import run_of
-from tests.bench.run.benches import SHORT, bench_file, protocol_file
+from tests.bench.run.benches import AIR, SHORT, bench_file, protocol_file
 
 
 def begin(folder: Path, **given: object):
@@ -40,14 +40,14 @@ def test_what_the_last_run_left_is_an_event_of_this_one(tmp_path):
 def test_run_and_status_tell_it_before_anything_else(padbench, tmp_path, monkeypatch):
     """A bench that counts as a real one; the run before was killed 0.75 mm deep in a pad."""
     monkeypatch.setattr(Bench, "all_simulated", property(lambda bench: False))
-    protocol = protocol_file(tmp_path, SHORT)
+    protocol = protocol_file(tmp_path, AIR)
     run_of(Path("runs"), "killed", 10, None, bench="simulated")
     said = padbench("status", "simulated")
     assert said.status == 0 and "the motor at 1.250 mm, in the pad" in said.out
     said = padbench("run", protocol, "--bench", "simulated", "--attended")
     assert said.status == 0, said
     assert "NOTICE" in said.out and "the motor at 1.250 mm, in the pad" in said.out and "padbench release" in said.out
-    assert said.out.index("NOTICE") < said.out.index("surface:")
+    assert said.out.index("NOTICE") < said.out.index("bench time")
 
 
 @pytest.mark.parametrize("bench", ["simulated", "another"])

@@ -12,14 +12,14 @@ import bench.run.runner as runner
 from bench import cli
 from bench.errors import InputError
 from bench.run.folder import RECORDING, own_folder
-from tests.bench.run.benches import SHORT, bench_file, protocol_file
+from tests.bench.run.benches import AIR, bench_file, protocol_file
 
 NOW = datetime.datetime(2026, 11, 21, 10, 15)
 
 
 def test_a_second_run_into_one_folder_is_refused_and_touches_nothing(padbench, tmp_path, monkeypatch):
     """The second begins when the first has its folder, and no recording in it yet."""
-    protocol, bench = protocol_file(tmp_path, SHORT), bench_file(tmp_path)
+    protocol, bench = protocol_file(tmp_path, AIR), bench_file(tmp_path)
     first_run, ended = runner.open_rig, []
 
     def slow(*given):
@@ -52,7 +52,7 @@ def test_a_recording_of_another_is_not_taken_away(padbench, tmp_path, monkeypatc
         return begun(path, *given, **options)
 
     monkeypatch.setattr(runner, "Recorder", late)
-    said = padbench("run", protocol_file(tmp_path, SHORT), "--bench", bench_file(tmp_path), "--out", "both")
+    said = padbench("run", protocol_file(tmp_path, AIR), "--bench", bench_file(tmp_path), "--out", "both")
     assert said.status == 2 and "exists already" in said.err
     assert Path("both", RECORDING).read_bytes() == b"another's"
 

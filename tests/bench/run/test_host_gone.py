@@ -237,7 +237,9 @@ def test_killed_on_its_way_a_motor_without_watchdog_stands_after_a_short_segment
         assert iai_servo_on(emulator), "it holds, as its bench file says"
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, pytest.param(signal.SIGHUP, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, *(pytest.param(n, marks=pytest.mark.long) for n in (signal.SIGINT, signal.SIGHUP))]
+)
 def test_a_signal_leaves_the_safe_state_of_the_bench_file(tmp_path, number):
     for attempt in range(3):
         folder = tmp_path / str(attempt)

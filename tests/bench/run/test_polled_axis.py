@@ -15,7 +15,7 @@ TRUE = {"m": 2.24, "b": 0.69, "c_1": 0.25, "c_2": 0.15, "nu_1": 4.0, "nu_2": 0.3
 """The shipped polyurethane pad."""
 
 
-@pytest.fixture(scope="module", params=[1, 2, 3])
+@pytest.fixture(scope="module", params=[1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))])
 def quick(request, tmp_path_factory) -> Done:
     folder = tmp_path_factory.mktemp("quick")
     return run(folder, "quick", "simulated_iai", simulation={"seed": request.param})

@@ -22,7 +22,7 @@ BY_FORCE = {
     "finish": {"retract": 0.3, "air": 0.5},
 }
 CASES = [
-    ("quick", "simulated", "polyurethane"),
+    pytest.param(("quick", "simulated", "polyurethane"), marks=pytest.mark.long),
     ("quick", "simulated", "silicone"),
     ("quick", "simulated_iai", "polyurethane"),
     ("quick", "simulated_modbus", "silicone"),
@@ -158,7 +158,7 @@ def test_stamps_are_when_it_was_measured(done):
     assert error.std() < 0.0125, "the noise of 10 mN, and little more"
 
 
-@pytest.mark.parametrize("base", ["simulated", "simulated_iai"])
+@pytest.mark.parametrize("base", ["simulated", pytest.param("simulated_iai", marks=pytest.mark.long)])
 def test_force_targets_are_met_and_held(tmp_path, base):
     done = run(tmp_path, BY_FORCE, base)
     assert done.outcome.cause is None
