@@ -28,6 +28,7 @@ RUNS = 12
 BIASED = 1.5  # times the errors drawn: what is drawn about is smooth already, and smoothing bends it less
 BENT = 3.0  # times what is left of the noise in rests and planned moves: those may be bent, too
 TOGETHER = 7  # entries whose scatter is taken for one
+MEDIAN = 0.455  # of a normal variable's square, over its mean
 SEEN = 0.3  # of the noise: less changes nothing
 
 
@@ -47,17 +48,21 @@ def felt_errors(prepared: Prepared, fit: Fit, errors_mm: Array) -> FeltErrors:
             scatter.add(position)
     own_N2 = np.maximum(uniform_filter1d(np.maximum(full.own.variance - through_pad.own.variance, 0.0), TOGETHER), 0.0)
     shared_N2 = np.maximum(full.shared.variance - through_pad.shared.variance, 0.0)
-    if resting.any():  # where a slider is held is chance, and few runs miss much of it in a rest
-        counts = data.weight * resting
-        pooled = float(np.sum(counts * shared_N2) / max(counts.sum(), 1.0))
-        shared_N2 = np.where(resting, np.maximum(shared_N2, pooled), shared_N2)
     modelled, late_s = force_at(prepared.full, fit.structure, fit.x), late_by_chance_s(prepared, fit)
     own_N2 += (late_s * force_rate(prepared.full, modelled)) ** 2
-    # no more than is there: what a fit meets well it shall go on meeting
     left = prepared.full.force_N - modelled
-    square = data.weight * (left - _common(stretch, data.weight, left)) ** 2
+    common = _common(stretch, data.weight, left)
+    if resting.any():  # where a slider is held is chance, and few runs miss much of it in a rest
+        counts = data.weight * resting
+        held_N2 = np.maximum(shared_N2, float(np.sum(counts * shared_N2)) / max(float(counts.sum()), 1.0))
+        # no more than is there: motion that comes to rest as it was planned turns no slider round, errors drawn may
+        there_N2 = np.maximum(common**2, float(np.median(common[resting] ** 2)) / MEDIAN)
+        shared_N2 = np.where(resting, np.minimum(held_N2, there_N2), shared_N2)
+    # nor of each sample's own: what a fit meets well it shall go on meeting
+    square = data.weight * (left - common) ** 2
     counted = np.maximum(uniform_filter1d(data.weight, TOGETHER), 1e-12)
-    own_N2 = np.minimum(own_N2, np.maximum(uniform_filter1d(square, TOGETHER), 0.0) / counted)
+    there_N2 = np.maximum(uniform_filter1d(square, TOGETHER), 0.0) / counted - prepared.noise.force_N**2
+    own_N2 = np.minimum(own_N2, np.maximum(there_N2, 0.0))
     least = (SEEN * prepared.noise.force_N) ** 2
     own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
     return FeltErrors(own_N, shared_N, stretch, late_s)

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from bench.config import load_model
 from bench.diagnose import diagnose
 from bench.diagnose.data import prepare
-from bench.diagnose.felt_errors import redrawn
+from bench.diagnose.felt_errors import felt_errors, redrawn
+from bench.identify.motion import holds
 from bench.recording.types import Measurement
 from sim.model import Model
+from tests.bench.diagnose.test_shapes import fitted
 from tests.bench.run.benches import SHORT, run
 
 Array = NDArray[np.float64]
@@ -59,6 +61,17 @@ def test_errors_are_drawn_as_large_as_they_are(step_mm: float) -> None:
         drawn.append(means(redrawn(p, rng), inside))
     off, told = np.sqrt(np.mean(np.square(real))), np.sqrt(np.mean(np.square(drawn)))
     assert 0.7 * off < told < 1.8 * off
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long), pytest.param(3, marks=pytest.mark.long)])
+def test_rests_that_a_fit_meets_are_not_in_doubt(seed: int) -> None:
+    """Errors that are drawn turn a slider round where a planned move comes to rest; the motion itself does not."""
+    _, prepared, fit = fitted("friction", "coulomb", "coulomb", 2.5, seed, protocol="random_steps", rate_hz=200.0)
+    felt, data = felt_errors(prepared, fit, redrawn(prepared, np.random.default_rng(seed))), prepared.full
+    resting = np.zeros(data.size, dtype=bool)
+    for hold in holds(data.time_s, data.position_mm):
+        resting[hold] = data.weight[hold] > 0.0
+    assert np.median(felt.total_N[resting]) < prepared.noise.force_N
 
 
 @pytest.mark.long
