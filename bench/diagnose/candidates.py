@@ -83,11 +83,22 @@ class Reach:
 
 def narrowed(form: Form, reach: Reach) -> Form:
     """The form with its parameters kept within what the data can tell of, and started there."""
+    longest_mm = _longest_mm(form, reach)
+    return replace(form, parameters=tuple(_narrowed(p, reach, longest_mm) for p in form.parameters))
+
+
+def _longest_mm(form: Form, reach: Reach) -> float:
+    """The longest way after which a form can be seen to repeat."""
     way_mm, share = reach.travel_mm, LONGEST_PERIOD
     if "report" in form.blocks and reach.depth_mm > 0.1 * reach.travel_mm:  # in air no force shows it
         way_mm, share = reach.depth_mm, LONGEST_REPORTED
-    longest_mm = way_mm * (share if reach.rich else LONGEST_IN_PASSING)
-    return replace(form, parameters=tuple(_narrowed(p, reach, longest_mm) for p in form.parameters))
+    return way_mm * (share if reach.rich else LONGEST_IN_PASSING)
+
+
+def _repeats_beyond(form: Form, reach: Reach) -> bool:
+    """Whether a form repeats over a longer way at the least than these data go: a part of one wave is any curve."""
+    period = next((p for p in form.parameters if p.name == "period"), None)
+    return ripple.ripples(form) and period is not None and period.lower >= _longest_mm(form, reach)
 
 
 def with_periods(form: Form, from_mm: float, to_mm: float) -> Form:
@@ -174,7 +185,7 @@ def forms(structure: Structure, in_air: bool, reach: Reach, also_unsought: bool 
             # A second block of a cause that is there already asks whether only its shape is another.
             if effect.id in present and (form.amend is not None or form.time_shift is not None):
                 continue
-            if in_air and not _in_air(form):
+            if (in_air and not _in_air(form)) or _repeats_beyond(form, reach):
                 continue
             if not (form.sought or also_unsought) or (form.amend is not None and not _amends(structure, form)):
                 continue

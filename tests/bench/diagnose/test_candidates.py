@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.diagnose.candidates import Reach, _scanned, alike, narrowed
+from bench.diagnose.candidates import Reach, _scanned, alike, forms, narrowed
 from bench.diagnose.late import LATE, as_late, lateness_s
 from bench.diagnose.numbers import PadNumbers, Structure, cause_of
 from bench.diagnose.refit import Fit
+from bench.diagnose.ripple import ripples
 from sim.effects import effect
 from sim.effects.base import Active
 from sim.elastic import Polynomial
@@ -33,6 +34,19 @@ def test_ringing_is_sought_at_all_frequencies_that_the_data_can_show(form, rate_
     beside = {values["frequency"] for values in _scanned(shape, {"frequency": near})}
     assert len(beside) < len(found) and min(beside) < 0.6 * near and max(beside) > 1.7 * near
     assert min(abs(np.log(f / near)) for f in beside) < 0.01
+
+
+@pytest.mark.parametrize(("travel_mm", "sought"), [(3.0, True), (3e-3, False)])
+def test_what_repeats_is_sought_where_the_way_holds_a_wave(travel_mm, sought):
+    """A cell is pressed by micrometres: no thread and no scale has so short a pitch, and any curve is a part of one."""
+    reach = Reach(1e-3, 10.0, travel_mm=travel_mm, depth_mm=0.8 * travel_mm, force_N=1e-6, changes_N=1e-5)
+    pad = Pad(Polynomial((0.0, 1e-3 / travel_mm)), Relaxation())
+    structure = Structure(PadNumbers(pad, 0.8 * travel_mm, 1e-6), ())
+    found = [form for _, form in forms(structure, False, reach) if ripples(form)]
+    assert bool(found) == sought
+    for form in found:
+        (period,) = (p for p in form.parameters if p.name == "period")
+        assert period.upper <= 1.6 * travel_mm
 
 
 @pytest.mark.parametrize("id_", LATE)
