@@ -40,7 +40,7 @@ def test_ringing_is_sought_at_all_frequencies_that_the_data_can_show(form, rate_
 def test_what_repeats_is_sought_where_the_way_holds_a_wave(travel_mm, sought):
     """A cell is pressed by micrometres: no thread and no scale has so short a pitch, and any curve is a part of one."""
     reach = Reach(1e-3, 10.0, travel_mm=travel_mm, depth_mm=0.8 * travel_mm, force_N=1e-6, changes_N=1e-5)
-    pad = Pad(Polynomial((0.0, 1e-3 / travel_mm)), Relaxation())
+    pad = Pad(Polynomial((0.0, 1e-3 / travel_mm)), Relaxation(), unilateral=True)
     structure = Structure(PadNumbers(pad, 0.8 * travel_mm, 1e-6), ())
     found = [form for _, form in forms(structure, False, reach) if ripples(form)]
     assert bool(found) == sought
