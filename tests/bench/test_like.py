@@ -52,7 +52,7 @@ def test_simulate_agrees_with_the_fit(fitted, tmp_path, capsys):
     assert "surface taken" in said
 
 
-@pytest.mark.parametrize("off_mm", [0.02, pytest.param(-0.02, marks=pytest.mark.long)])
+@pytest.mark.parametrize("off_mm", [pytest.param(off, marks=pytest.mark.long) for off in (0.02, -0.02)])
 def test_a_surface_that_is_off_is_found_within_its_doubt(fitted, off_mm):
     done, model, fit = fitted
     m = done.recording.measurement()

@@ -64,8 +64,15 @@ def test_samples_move_to_where_the_motion_passed_them(monkeypatch: pytest.Monkey
     assert max(better) < 1.1, better
 
 
-@pytest.mark.parametrize("jitter", ["none", "sampling"])
-@pytest.mark.parametrize("protocol", ["staircase", "random_steps"])
+@pytest.mark.parametrize(
+    ("jitter", "protocol"),
+    [
+        ("none", "random_steps"),
+        ("sampling", "staircase"),
+        pytest.param("none", "staircase", marks=pytest.mark.long),
+        pytest.param("sampling", "random_steps", marks=pytest.mark.long),
+    ],
+)
 def test_honest_stamps_stay(jitter: str, protocol: str) -> None:
     for seed in SEEDS:
         m = measurement(drawn(seed, jitter, protocol))

@@ -161,7 +161,7 @@ def test_load_cell_over_a_simulated_port(name: str) -> None:
         cell.link.close()
 
 
-@pytest.mark.parametrize("name", ["orca", "iai", "smc_lec"])
+@pytest.mark.parametrize("name", ["orca", "iai", pytest.param("smc_lec", marks=pytest.mark.long)])
 def test_motor_over_a_pseudo_terminal(name: str) -> None:
     on_the_wall(
         lambda: emulated(name, "dad141"),

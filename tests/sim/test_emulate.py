@@ -139,6 +139,7 @@ def test_a_port_that_is_pulled_out_and_plugged_in_again() -> None:
     assert not Path(paths["motor"]).parent.exists()
 
 
+@pytest.mark.long
 def test_a_network_that_is_pulled_out_and_plugged_in_again() -> None:
     fault = {"kind": "unplugged", "device": "load_cell", "at_s": 4.0, "duration_s": 2.0}
     with emulated(load_cell=DAD | {"driver": "dad141_modbus"}, faults=[fault]) as (paths, _):

@@ -33,7 +33,10 @@ def test_every_effect_of_the_catalogue_is_here():
     assert all(len(EFFECTS[id].shapes) >= 2 for id in CATALOGUE)
 
 
-@pytest.mark.parametrize(("id", "shape"), SHAPES)
+# The half of them of every day: the drawing is one for all, and each shape has tests of its own.
+@pytest.mark.parametrize(
+    ("id", "shape"), [*SHAPES[::2], *(pytest.param(*pair, marks=pytest.mark.long) for pair in SHAPES[1::2])]
+)
 def test_each_shape_changes_the_recording_at_any_size(id, shape):
     plain = {"motion": SHORT, "rate_hz": 800.0, "noise_kind": "white", "own_clock": False, "jitter": "none"}
     for size in (0.05, 1.0, 2.5):

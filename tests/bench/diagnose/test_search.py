@@ -45,7 +45,7 @@ def test_a_form_whose_valley_is_apart_from_the_best_ones_is_found(seed):
     assert fit.chi2 < 1.1 * search.expected
 
 
-@pytest.mark.parametrize("seed", [1, 3, 9])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (3, 9))])
 def test_a_missing_mode_is_found_though_the_others_have_spread_over_its_place(seed):
     """From where too few modes have ended, steps along one more of them lead far away."""
     c = draw_case(seed, ("missing_relaxation_mode",), 2.5, "log_normal", protocol="staircase", rate_hz=150.0,
@@ -76,7 +76,7 @@ def test_where_a_model_runs_away_its_error_has_no_end_and_no_step_is_taken_there
     assert np.array_equal(refit(data, Structure(pad), pad.x(), 5).x, pad.x())
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3))])
 def test_two_shapes_of_one_cause_are_united_where_a_form_has_both(seed):
     """A mass of which a part rings on its adapter: found as one that rings, with a rigid one beside it."""
     told = {"protocol": "random_steps", "rate_hz": 400.0, "jitter": "none", "own_clock": False}
@@ -182,7 +182,7 @@ def test_rivals_stand_against_what_the_fit_before_left_in_the_same_units(seed):
     assert shares == pytest.approx([second / best], rel=0.05)
 
 
-@pytest.mark.parametrize("seed", [1, 6, 9, 16, 20])
+@pytest.mark.parametrize("seed", [1, 6, *(pytest.param(s, marks=pytest.mark.long) for s in (9, 16, 20))])
 def test_a_softening_that_bends_at_a_depth_is_found_wherever_that_is(seed):
     """With each depth held that the bend passes the error grows first: from afar no way leads to where it is. (Of seeds
     1 to 20, those with which three starts lead elsewhere.)"""

@@ -51,10 +51,10 @@ def stated(fit: Fit, name: str) -> tuple[float, float]:
     [
         ("viscous_damping", "thinning", "linear", "coefficient", "power"),
         ("viscous_damping", "one_sided", "linear", "coefficient", "one_sided"),
-        ("depth_dependent_relaxation", "knee", "linear", "slope", "knee"),
+        pytest.param("depth_dependent_relaxation", "knee", "linear", "slope", "knee", marks=pytest.mark.long),
         ("cogging", "iron", "sine", "period", "trailing"),
         ("inertia", "cable_chain", "rigid", "mass", "growing"),
-        ("damage", "hyperbolic", "linear", "rate", "hyperbolic"),
+        pytest.param("damage", "hyperbolic", "linear", "rate", "hyperbolic", marks=pytest.mark.long),
     ],
 )
 def test_another_shape_that_fits_better_takes_its_place(id: str, shape: str, form: str, name: str, better: str) -> None:

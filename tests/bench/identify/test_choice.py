@@ -21,7 +21,7 @@ SHARES, RATES = (0.25, 0.15), (4.0, 0.35)
     [
         (Exponential(2.24, 0.69), None),
         pytest.param(Power(1.7, 0.8), None, marks=pytest.mark.long),
-        (Polynomial((0.0, 2.0, -0.3, 0.5)), 3),
+        pytest.param(Polynomial((0.0, 2.0, -0.3, 0.5)), 3, marks=pytest.mark.long),
     ],
     ids=["exponential", "power", "polynomial"],
 )
@@ -34,7 +34,7 @@ def test_the_structure_the_data_were_made_with_is_chosen(law, degree, contact) -
     assert right == 3
 
 
-@pytest.mark.parametrize("order", [1, 3])
+@pytest.mark.parametrize("order", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_other_orders(order: int) -> None:
     shares, rates = ((0.4,), (1.3,)) if order == 1 else ((0.2, 0.15, 0.1), (12.0, 1.4, 0.15))
     result = fit(measured(Pad(Exponential(2.24, 0.69), shares, rates), noise_N=0.01, samples=3000))

@@ -46,9 +46,10 @@ def test_parameters_are_honest_though_the_surface_is_off(pad: Pad) -> None:
     assert np.std(np.subtract(found, off)) < 0.3 * DOUBT_MM
 
 
-def test_a_misplaced_surface_is_not_taken_for_another_law() -> None:
-    chosen = [(r.law, r.order) for r in (fit(misplaced(EXPONENTIAL, seed)[0]) for seed in range(6))]
-    assert chosen.count(("exponential", 2)) >= 5
+@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 12), marks=pytest.mark.long)])
+def test_a_misplaced_surface_is_not_taken_for_another_law(seeds: range) -> None:
+    chosen = [(r.law, r.order) for r in (fit(misplaced(EXPONENTIAL, seed)[0]) for seed in seeds)]
+    assert chosen.count(("exponential", 2)) >= len(seeds) - 1
 
 
 def test_it_is_said() -> None:

@@ -58,7 +58,7 @@ def seen_whole(path: Path, recording: Recording, last_s: float) -> None:
     assert np.array_equal(again.load_cell.force_N, recording.load_cell.force_N)
 
 
-@pytest.mark.parametrize("lives_s", [0.13, 0.37, 0.71, 1.1])
+@pytest.mark.parametrize("lives_s", [0.13, 0.71, *(pytest.param(s, marks=pytest.mark.long) for s in (0.37, 1.1))])
 @pytest.mark.parametrize("mode", ["inline", "process"])
 def test_everything_is_killed_at_once(tmp_path, mode, lives_s):
     path = tmp_path / "run.mcap"

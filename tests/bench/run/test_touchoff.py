@@ -56,7 +56,9 @@ def test_error_and_stated_deviation_agree(seeds):
     assert np.median(np.abs(errors)) < 0.02
 
 
-@pytest.mark.parametrize("shape", PULLS)
+@pytest.mark.parametrize(
+    "shape", ["dies_out", *(pytest.param(s, marks=pytest.mark.long) for s in PULLS if s != "dies_out")]
+)
 def test_a_pad_that_pulls_begins_where_it_is_touched(shape):
     """Not where it is felt first, and not where the force is zero again."""
     errors, stated = [], []
