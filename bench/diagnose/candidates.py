@@ -97,8 +97,10 @@ def _longest_mm(form: Form, reach: Reach) -> float:
 
 def _repeats_beyond(form: Form, reach: Reach) -> bool:
     """Whether a form repeats over a longer way at the least than these data go: a part of one wave is any curve."""
-    period = next((p for p in form.parameters if p.name == "period"), None)
-    return ripple.ripples(form) and period is not None and period.lower >= _longest_mm(form, reach)
+    if not ripple.ripples(form):
+        return False
+    period = next(p for p in form.parameters if p.name == "period")
+    return period.lower >= _longest_mm(form, reach)
 
 
 def with_periods(form: Form, from_mm: float, to_mm: float) -> Form:

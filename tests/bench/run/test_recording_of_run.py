@@ -228,7 +228,7 @@ def test_a_run_over_terminals_that_is_stopped_and_one_that_is_killed(tmp_path):
         process = started(*words, str(stopped), "--attended")
         until(process, lambda: steps_of(stopped) >= 2)
         process.send_signal(signal.SIGTERM)
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=240)  # fit, diagnosis and report come after the stop
         assert process.returncode == 1, err
         assert "STOPPED: stopped by signal SIGTERM" in out and err == ""
         recording = read_recording(stopped)
