@@ -61,8 +61,8 @@ def felt_errors(prepared: Prepared, fit: Fit, errors_mm: Array) -> FeltErrors:
     # nor of each sample's own: what a fit meets well it shall go on meeting
     square = data.weight * (left - common) ** 2
     counted = np.maximum(uniform_filter1d(data.weight, TOGETHER), 1e-12)
-    there_N2 = np.maximum(uniform_filter1d(square, TOGETHER), 0.0) / counted - prepared.noise.force_N**2
-    own_N2 = np.minimum(own_N2, np.maximum(there_N2, 0.0))
+    beyond_N2 = uniform_filter1d(square, TOGETHER) / counted - prepared.noise.force_N**2
+    own_N2 = np.minimum(own_N2, np.maximum(beyond_N2, 0.0))
     least = (SEEN * prepared.noise.force_N) ** 2
     own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
     return FeltErrors(own_N, shared_N, stretch, late_s)

@@ -52,7 +52,8 @@ def test_simulate_agrees_with_the_fit(fitted, tmp_path, capsys):
     assert "surface taken" in said
 
 
-@pytest.mark.parametrize("off_mm", [pytest.param(off, marks=pytest.mark.long) for off in (0.02, -0.02)])
+@pytest.mark.long
+@pytest.mark.parametrize("off_mm", [0.02, -0.02])
 def test_a_surface_that_is_off_is_found_within_its_doubt(fitted, off_mm):
     done, model, fit = fitted
     m = done.recording.measurement()
@@ -89,14 +90,13 @@ def test_csv_is_taken_as_it_is(fitted, tmp_path, capsys):
     assert "surface" not in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("hidden", "known"),
     [
-        pytest.param(
-            [{"id": "friction", "coulomb": 0.15}], [{"id": "friction", "coulomb": 0.1}], marks=pytest.mark.long
-        ),
-        pytest.param([{"id": "mains_hum", "amplitude": 0.06, "frequency": 50.1}], [], marks=pytest.mark.long),
-        pytest.param([{"id": "force_bias", "bias": 0.08}], [], marks=pytest.mark.long),
+        ([{"id": "friction", "coulomb": 0.15}], [{"id": "friction", "coulomb": 0.1}]),
+        ([{"id": "mains_hum", "amplitude": 0.06, "frequency": 50.1}], []),
+        ([{"id": "force_bias", "bias": 0.08}], []),
     ],
     ids=["friction", "hum", "bias"],
 )

@@ -21,13 +21,18 @@ RICH = (
 )
 LATER = ("third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "judge")
 # The common tests are of those that have not stood for long: each set has tests of its own besides.
-NEW = LATER[-1:]
+NEW = LATER[-2:]
 SHAPES = written_in(CATALOGUE, *NEW)
 BEYOND = written_in(tuple(outside(CATALOGUE, *NEW)), *NEW)
 CONTACTS = ("bonded", "unilateral")
 # Of those that have stood for long one kind of contact each, in turn: there are many.
 TOUCHED = [(*pair, CONTACTS[k % 2]) for k, pair in enumerate(BEYOND) if pair[1] not in EFFECTS[pair[0]].judge]
 TOUCHED += [(*pair, contact) for pair in BEYOND if pair[1] in EFFECTS[pair[0]].judge for contact in CONTACTS]
+
+
+def of_every_day(cases):
+    """The judge's of every day, the others of the long tests."""
+    return [c if c[1] in EFFECTS[c[0]].judge else pytest.param(*c, marks=pytest.mark.long) for c in cases]
 
 
 def test_the_judge_keeps_to_itself():
@@ -50,7 +55,7 @@ def test_a_seed_draws_none_of_the_later_shapes():
         assert draw_case(0, ("friction",), 1.0, shape, **plain).truth.shapes == {"friction": shape}
 
 
-@pytest.mark.parametrize(("id", "shape"), SHAPES)
+@pytest.mark.parametrize(("id", "shape"), of_every_day(SHAPES))
 def test_each_shape_changes_the_recording_at_any_size(id, shape):
     plain = {"motion": SHORT, "rate_hz": 800.0, "noise_kind": "white", "jitter": "none"}
     plain |= {} if id == "clock_skew" else {"own_clock": False}
@@ -78,7 +83,7 @@ def test_each_shape_changes_the_recording_at_any_size(id, shape):
 # --- outside the catalogue --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("id", "shape"), BEYOND)
+@pytest.mark.parametrize(("id", "shape"), of_every_day(BEYOND))
 def test_what_is_outside_is_seen_at_its_typical_size(id, shape):
     told = {"law": "power", "contact": "unilateral", "noise_N": 0.01, **PLAIN}
     case, again = (draw_case(31, (id,), 1.0, shape, **told) for _ in range(2))
@@ -90,7 +95,7 @@ def test_what_is_outside_is_seen_at_its_typical_size(id, shape):
     assert not np.allclose(other.truth.clean_N, case.truth.clean_N, atol=1e-4)
 
 
-@pytest.mark.parametrize(("id", "shape", "contact"), TOUCHED)
+@pytest.mark.parametrize(("id", "shape", "contact"), of_every_day(TOUCHED))
 def test_what_is_outside_stays_finite_and_grows_with_its_size(id, shape, contact):
     cases = [draw_case(33, (id,), size, shape, contact=contact, **PLAIN) for size in (0.0, 0.05, 2.5)]
     for case in cases:
@@ -101,7 +106,7 @@ def test_what_is_outside_stays_finite_and_grows_with_its_size(id, shape, contact
     assert 0 < np.std(small - none) < 0.2 * np.std(large - none)
 
 
-@pytest.mark.parametrize(("id", "shape"), BEYOND)
+@pytest.mark.parametrize(("id", "shape"), of_every_day(BEYOND))
 def test_what_is_of_the_pad_is_not_felt_in_air(id, shape):
     motion = Path(-1.5).hold(0.2).to(-0.5, 20.0).hold(0.5).to(-1.5, 20.0).hold(0.2).motion()
     fine, _, _ = hidden(id, shape, motion=motion)

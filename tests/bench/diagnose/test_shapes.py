@@ -85,7 +85,8 @@ def test_a_spectrum_gives_back_the_mode_of_the_pad_whose_place_it_has(seed: int)
     assert np.max(np.abs(near)) < 0.5 < np.max(np.abs(far))
 
 
-@pytest.mark.parametrize("seed", [pytest.param(seed, marks=pytest.mark.long) for seed in (0, 1)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [0, 1])
 def test_a_period_longer_than_any_that_was_sought_is_found(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Long periods are not sought while another law may stand first; a shorter one leaves something."""
     c, p, right = fitted("encoder_error", "harmonic", "harmonics", 2.5, seed, protocol="random_steps")

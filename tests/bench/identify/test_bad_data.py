@@ -154,18 +154,18 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", CASES)
-def test_the_fit_says_what_is_wrong_and_what_it_costs(name, tmp_path, capsys):
+def test_the_fit_says_what_is_wrong_and_what_it_costs(name, seed, tmp_path, capsys):
     made, said, lost = CASES[name]
-    for seed in range(1):
-        csv = made(seed).write(tmp_path / f"{seed}.csv")
-        out = tmp_path / "fit.json"
-        assert cli.main(["fit", str(csv), "--law", "exponential", "--order", "2", "--json", str(out)]) == 0
-        text = capsys.readouterr().out
-        assert said in text and text.count(said) <= (2 if name in ("gaps", "zeros") else 1)
-        found = json.loads(out.read_text())
-        assert set(lost) <= set(found["undetermined"])
-        assert said in " ".join(found["notes"])
+    csv = made(seed).write(tmp_path / f"{seed}.csv")
+    out = tmp_path / "fit.json"
+    assert cli.main(["fit", str(csv), "--law", "exponential", "--order", "2", "--json", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert said in text and text.count(said) <= (2 if name in ("gaps", "zeros") else 1)
+    found = json.loads(out.read_text())
+    assert set(lost) <= set(found["undetermined"])
+    assert said in " ".join(found["notes"])
 
 
 def of_data(made: Rows) -> list[str]:

@@ -86,7 +86,7 @@ def test_cost_is_never_above_that_of_the_truth() -> None:
 
 @pytest.mark.parametrize("colour_s", [0.0, pytest.param(0.03, marks=pytest.mark.long)])
 def test_noise_floor_is_the_noise(colour_s: float) -> None:
-    ratios = [one.result.noise_floor / one.data.truth.noise.force.std for one in draws(colour_s)]  # type: ignore[union-attr]
+    ratios = [one.result.noise_floor / one.data.truth.noise.force.std for one in draws(colour_s)]
     assert 0.85 < np.median(ratios) < 1.1
 
 

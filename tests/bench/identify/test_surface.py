@@ -49,7 +49,7 @@ def test_parameters_are_honest_though_the_surface_is_off(pad: Pad) -> None:
 @pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 12), marks=pytest.mark.long)])
 def test_a_misplaced_surface_is_not_taken_for_another_law(seeds: range) -> None:
     chosen = [(r.law, r.order) for r in (fit(misplaced(EXPONENTIAL, seed)[0]) for seed in seeds)]
-    assert chosen.count(("exponential", 2)) >= len(seeds) - 1
+    assert chosen.count(("exponential", 2)) >= 5 * len(seeds) / 6
 
 
 def test_it_is_said() -> None:
