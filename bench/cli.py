@@ -19,6 +19,7 @@ from typing import Any, NoReturn
 
 from bench.commands.outputs import check_outputs
 from bench.errors import EXIT_BAD_INPUT, EXIT_DEFECT, EXIT_NO, PadbenchError
+from bench.one_thread import one_thread
 
 COMMANDS = {
     "run": "run a protocol on a bench, fit the pad, write the report",
@@ -115,8 +116,7 @@ def parser(command: str | None) -> tuple[Parser, Parser]:
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command; returns the exit status of docs/formats.md."""
-    for library in ("OPENBLAS", "OMP", "MKL"):  # small matrices: several threads cost more than they give
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    one_thread()
     words = sys.argv[1:] if argv is None else argv
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

@@ -1,6 +1,5 @@
 """Before anything else of a test run: linear algebra in one thread, as the commands have it."""
 
-import os
+from bench.one_thread import one_thread
 
-for library in ("OPENBLAS", "OMP", "MKL"):  # workers side by side, each with a thread for every core, wait for cores
-    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+one_thread()

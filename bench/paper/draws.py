@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.errors import InputError
+from bench.one_thread import ONE_THREAD
 from bench.paper.experiment import Fitted, fits_of
 from bench.paper.settings import Settings
 
@@ -78,8 +79,7 @@ def kept(path: Path, key: str) -> dict[int, Draw]:
 def _spread(
     settings: Settings, missing: list[int], starts: int, key: str, jobs: int, keep: Callable[[dict[str, Any]], None]
 ) -> None:
-    # A process has one core: threads of the linear algebra would only be in each other's way. It reads this on import.
-    with _environment(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")):
+    with _environment(ONE_THREAD):  # a process has one core
         pool = ProcessPoolExecutor(min(jobs, len(missing)), multiprocessing.get_context("spawn"), _leave_to_parent)
         futures = [pool.submit(_one, settings, draw, starts, key) for draw in missing]
         try:

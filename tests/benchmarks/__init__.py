@@ -1,0 +1,5 @@
+"""Benchmarks, with linear algebra in one thread as the commands have it."""
+
+from bench.one_thread import one_thread
+
+one_thread()

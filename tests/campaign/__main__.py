@@ -13,6 +13,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from pathlib import Path
 from typing import Any
 
+from bench.one_thread import ONE_THREAD
 from tests.truth.effects import HALVES
 
 from .count import causes, wrongs
@@ -20,8 +21,6 @@ from .judge import run
 from .plan import Item, plan
 from .show import failures, shown
 from .table import page
-
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def read(path: Path) -> list[dict[str, Any]]:
@@ -39,7 +38,7 @@ def read(path: Path) -> list[dict[str, Any]]:
 
 def work(items: Sequence[Item], out: Path, jobs: int, minutes: float | None) -> None:
     """Diagnose in processes of their own and append as they come; no new ones after `minutes`."""
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    os.environ.update(ONE_THREAD)
     begun, waiting = time.monotonic(), list(reversed(items))
     out.parent.mkdir(parents=True, exist_ok=True)
     torn = out.exists() and not out.read_bytes().endswith(b"\n") and out.stat().st_size > 0

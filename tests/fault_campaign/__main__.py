@@ -10,6 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
+from bench.one_thread import ONE_THREAD
 from tests.fault_campaign.draw import draw
 from tests.fault_campaign.judge import Verdict, tried
 
@@ -36,7 +37,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default: %(default)s)")
     parser.add_argument("--show", action="store_true", help="say of each seed what it stands for, and what it came to")
     given = parser.parse_args(argv)
-    os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"))
+    os.environ.update(ONE_THREAD)
     begun = time.monotonic()
     hows: Counter[str] = Counter()
     failed = 0
