@@ -223,7 +223,7 @@ class Signatures:
         Q = np.linalg.qr(J / np.linalg.norm(J, axis=0))[0] if J.shape[1] else np.zeros((data.size, 0))
         self.Q = [np.ascontiguousarray(q) for q in Q.T]
         self.residual = self._clear(data.whitened(data.force_N - self.force))
-        self.waves: dict[tuple[str, str, float, float], Array] = {}  # by wave, period and phase: forms share them
+        self.waves: dict[tuple[str, str], ripple.Waves] = {}  # by effect and form: several forms begin with one
 
     def _clear(self, column: Array) -> Array:
         for q in self.Q:
@@ -339,18 +339,19 @@ def starts(
 def _rippling(signatures: Signatures, effect: Effect, cause: Cause, most: int) -> list[Start]:
     """Starts of what repeats with the position."""
     plain = {p.name for p in cause.form.parameters} == {p.name for p in effect.forms[0].parameters}
-    sine, amplitude = cause_of(effect, cause.form if plain else effect.forms[0]), cause.amplitude
+    # at its own bounds: a second sine may have a shorter period than the first is sought with
+    sine, amplitude = cause_of(effect, effect.form(cause.form.name if plain else None)), cause.amplitude
     assert amplitude is not None
 
     def column(period_mm: float, phase_rad: float) -> Array:
-        key = (effect.id, sine.form.name, period_mm, phase_rad)
-        if key not in signatures.waves:
-            signatures.waves[key] = signatures.column(sine.with_start(period=period_mm, phase=phase_rad))
-        return signatures.waves[key]
+        return signatures.column(sine.with_start(period=period_mm, phase=phase_rad))
 
+    key = (effect.id, sine.form.name)
+    if key not in signatures.waves:
+        signatures.waves[key] = ripple.Waves(column, signatures.residual)
     out = []
     most = 1 if ripple.two_periods(cause.form) else most
-    for values, promise in ripple.starts(cause.form, column, signatures.residual, most):
+    for values, promise in ripple.starts(cause.form, signatures.waves[key], most):
         size = min(max(values["amplitude"], 0.05 * amplitude.typical), 5 * amplitude.typical)
         values["amplitude"] = _inside(size, amplitude.lower, amplitude.upper)
         out.append(Start(cause.with_start(**values), promise))

@@ -81,13 +81,19 @@ class Sieve:
             if (only is None or pair[0].id in only) and (pair[0].id not in self.known or pair[1].name in KNEES)
         ]
         self.progress(f"signatures of {len(wanted)} shapes")
-        by_id: dict[str, list[Start]] = {}
         family: dict[str, list[Form]] = {}
         for effect, form in wanted:
             family.setdefault(effect.id, []).append(form)
+        effects = {effect.id: effect for effect, _ in wanted}
+
+        def begun(id_: str) -> list[Start]:
+            return [start for form in family[id_] for start in starts(signatures, effects[id_], form)]
+
         with ThreadPoolExecutor(WORKERS) as pool:
-            for pair, found in zip(wanted, pool.map(lambda p: starts(signatures, *p), wanted), strict=True):
-                by_id.setdefault(pair[0].id, []).extend(found)
+            # a thread has all forms of an id, which may share what they begin with; those that take longest come first
+            ids = sorted(family, key=lambda i: -len(family[i]))
+            found = dict(zip(ids, pool.map(begun, ids), strict=True))
+            by_id = {id_: found[id_] for id_ in family}
             promising = self._promising(by_id, least) if only is None else list(by_id)
             for id_, start in self._hidden(signatures, wanted):
                 by_id[id_].append(start)

@@ -44,6 +44,9 @@ _OF_A_ROOT, _ROOT, _PLAIN = 0.491, 0.908, 1.679  # Hu's fit for a sphere: share 
 _GEL_LASTS = 0.7507262302  # of Hu's time s: when 1/e is left
 
 
+_gauss = functools.lru_cache(np.polynomial.legendre.leggauss)  # nodes and weights; asked for in every step of a fit
+
+
 def _with_modes(pad: Pad, shares: Sequence[float], rates: Sequence[float]) -> Pad:
     from sim.relaxation import Relaxation
 
@@ -62,10 +65,10 @@ def _exponential(pad: Pad, values: Mapping[str, float]) -> Pad:
 @functools.lru_cache(maxsize=64)
 def _stretched_rates(beta: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Weights and rates of modes that add up to e^(−t^β): Gauss's nodes in the probability of the rate."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = _gauss(NODES)
     if beta >= 1.0 - 1e-9:
         return tuple(0.5 * weights), (1.0,) * NODES
-    angle_nodes, angle_weights = np.polynomial.legendre.leggauss(200)
+    angle_nodes, angle_weights = _gauss(200)
     angle = 0.5 * math.pi * (1.0 + angle_nodes)
     log_a = (
         beta / (1.0 - beta) * np.log(np.sin(beta * angle))
@@ -88,7 +91,7 @@ def _stretched(pad: Pad, values: Mapping[str, float]) -> Pad:
 
 
 def _box(pad: Pad, values: Mapping[str, float]) -> Pad:
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = _gauss(NODES)
     rates = values["rate"] * 10.0 ** (0.5 * values["decades"] * nodes)
     return _with_modes(pad, [float(values["share"] * 0.5 * w) for w in weights], [float(k) for k in rates])
 
@@ -98,7 +101,7 @@ def _gamma_rates(n: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Weights and rates of modes that add up to (1 + t/τ)^−n, 1/e at t = 1."""
     from scipy.special import gammaincinv
 
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = _gauss(NODES)
     rates = gammaincinv(n, 0.5 * (1.0 + nodes)) * math.expm1(1.0 / n)
     return tuple(0.5 * weights), tuple(float(rate) for rate in rates)
 
@@ -109,7 +112,7 @@ def _power(pad: Pad, values: Mapping[str, float]) -> Pad:
 
 
 def _fractional(pad: Pad, values: Mapping[str, float]) -> Pad:
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = _gauss(NODES)
     order, below = values["order"], 0.5 * (1.0 + nodes)
     rates = (np.sin(math.pi * order * below) / np.sin(math.pi * order * (1.0 - below))) ** (1.0 / order)
     shares = [float(values["share"] * 0.5 * w) for w in weights]
