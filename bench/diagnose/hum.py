@@ -190,12 +190,14 @@ def _with_harmonics(line: Line, t: Array, e: Array, least: float, highest: float
     """The line with those of its harmonics that are more than chance, and do not look like each other."""
     f, rate = line.frequency_Hz, 1.0 / line.sample_s
     seen, found = [float(_folded(f, rate))], []
+    left = e - line.force_N(t, t)  # between holds nothing is seen: a line leaks far, into what is folded beside it
     for order in HARMONICS:
         here = float(_folded(order * f, rate))
         if LOWEST_HZ < here < highest and min(abs(here - other) for other in seen) > 16.0 * spacing:
-            more, sine, cosine = _taken(t, e, order * f)
+            more, sine, cosine = _taken(t, left, order * f)
             if more > least:
                 seen.append(here)
+                left = left - sine * np.sin(2.0 * np.pi * order * f * t) - cosine * np.cos(2.0 * np.pi * order * f * t)
                 found.append((order, float(np.hypot(sine, cosine)) / line.amplitude_N, float(np.arctan2(cosine, sine))))
     third = next(((ratio, phase) for order, ratio, phase in found if order == 3), (0.0, 0.0))
     return replace(line, ratio=third[0], third_phase_rad=third[1], higher=tuple(one for one in found if one[0] != 3))

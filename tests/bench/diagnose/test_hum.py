@@ -36,3 +36,13 @@ def test_hum_that_is_always_there_comes_in_no_bursts(seed):
     t, _, force, parts = hummed(np.ones(1), np.random.default_rng(seed))
     line = find(0.0, parts, t, force)
     assert line is not None and not line.bursts and line.amplitude_N == pytest.approx(0.04, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("rate_hz", [250.0, 300.0, 350.0])
+def test_a_sine_has_no_harmonics_where_they_would_be_folded_beside_it(rate_hz, seed):
+    t, hum, force, parts = hummed(np.ones(1), np.random.default_rng(seed), rate_hz)
+    line = find(0.0, parts, t, force)
+    assert line is not None
+    assert (line.ratio, line.higher, line.fires_rad) == (0.0, (), 0.0)
+    assert np.sqrt(np.mean((line.force_N(t, force) - hum) ** 2)) < 0.02 * 0.04
