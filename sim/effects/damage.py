@@ -1,6 +1,7 @@
 """Damage: the pad gets softer with all the way it has been loaded, for good, at whatever depth.
 
-Travel is the sum of all depth gained while loading. Positions come with noise, which would add up: a gain counts once
+Travel is the sum of all depth that the surface gains while it is loaded: where the probe comes back before the pad has
+recovered, the way to the surface does not count. Positions come with noise, which would add up: a gain counts once
 it exceeds a dead band (`dead_band`, a choice and not fitted).
 
 - `exponential`: floor + (1 − floor) e^(−rate · travel/(1 − floor)).
