@@ -30,7 +30,8 @@ STEPS, DEVIATIONS = 2.0, 8.0  # of the channel, and of its noise: so far a force
 
 def with_pulses(m: Measurement, flags: Faults) -> Faults:
     """With the pulses of a channel that has some in holds, where nothing else makes it rise at once and go back."""
-    return replace(flags, outlier=flags.outlier | _in_holds_too(resting(m), pulses(m.force_N, ~flags.by_itself)))
+    pulsed = pulses(m.force_N, ~flags.by_itself, resolution(m.force_N))
+    return replace(flags, outlier=flags.outlier | _in_holds_too(resting(m), pulsed))
 
 
 def _in_holds_too(at_rest: Mask, pulsed: Mask) -> Mask:
@@ -122,7 +123,7 @@ def _strays_again(
     step_N = resolution(m.force_N)
     outlier = standing_off(told, known, suspect, step_N)
     outlier &= ~of_the_model(modelled, errors, outlier)
-    pulsed = _in_holds_too(at_rest, pulses(told, known))
+    pulsed = _in_holds_too(at_rest, pulses(told, known, step_N))
     outlier |= pulsed
     if outlier.sum() < FEW and not suspect.any():
         outlier &= at_rest  # one or two in moves, in a channel without strays, are at the motion's corners

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 from scipy.stats import t as student_t
 
 from bench.felt_motion import resolution
@@ -23,6 +24,8 @@ Mask = NDArray[np.bool_]
 AGAIN = 0.01  # of the samples that repeat the one before, at the least, where digits are not so many
 FEW_REPEATS = 4  # equal pairs that are no accident where digits are many
 CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
+STANDS = 0.5  # share of equal pairs beyond which noise is less than half a step
+LEAPS = 3  # steps by which what has stuck in such a channel catches up, at the least
 SETTLING = 20  # samples after a move that are not yet a hold
 LEAVING = 3  # samples at the end of a hold that may already move
 CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
@@ -44,6 +47,7 @@ ASIDE, CALM = 8, 0.6  # neighbours on either side of a force or a residual, and 
 FAR = 6.0  # noise deviations that an outlier stands off at the least
 FEW, ALONE = 3, 1.7  # outliers that are a fault; and times further off is one that is no fault, but no noise either
 HEAPS = 3.0  # steps of a coarse channel within which its noise is
+NEXT = 1.5  # steps: the value next to the one that stands is none that stands off, however seldom it comes
 BULK = 9.0  # medians of the size: within some six deviations of white noise
 DOUBT = 2.0  # of the logarithm of the likelihood of a tail: two standard deviations
 DEGREES = np.array([2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 30.0, 100.0])
@@ -287,19 +291,35 @@ def _stuck(force: Array, but: Mask) -> Mask:
         return mask
     # how often a sample equals the one before when nothing sticks: judged where values change most
     same = np.concatenate([[0.0], (np.diff(force) == 0).astype(float)])
-    if resolution(force) > 0.0:
+    step, caught = resolution(force), np.zeros(len(first), dtype=bool)
+    if step > 0.0:
         window = max(len(force) // 40, 20)
         shares = np.convolve(same, np.ones(window) / window, mode="same")
         p = max(float(np.median(shares[window:-window] if len(force) > 3 * window else shares)), 0.05)
+        if p > STANDS:  # noise hardly leaves a step: in its middle a force stands long, but nothing leaps in the end
+            caught = (length >= _least(min(p, 0.97), len(force))) & _catches_up(force, first, length, step)
+            # neighbours are apart as often as noise crosses a step's edge, of which there is one wherever the force is
+            noise_steps = 0.5 * np.sqrt(np.pi) * (1.0 - p)
+            p = float(np.clip(2.0 * norm.cdf(0.5 / max(noise_steps, 1e-3)) - 1.0, p, 1.0 - 1e-12))
     else:
         chance = _equal_by_chance(force)
-        p = 0.0 if _no_accident(int(same.sum()), chance) else max(chance / len(force), AGAIN)
-    p = min(p, 0.97)
-    least = int(np.ceil(np.log(CHANCE / len(force)) / np.log(p))) + 1 if p > 0.0 else 2
-    for start, count in zip(first.tolist(), length.tolist(), strict=True):
-        if count >= least and not but[start]:
-            mask[start + 1 : start + count] = True
+        p = 0.0 if _no_accident(int(same.sum()), chance) else min(max(chance / len(force), AGAIN), 0.97)
+    long = ((length >= _least(p, len(force))) | caught) & ~but[first]
+    for start, count in zip(first[long].tolist(), length[long].tolist(), strict=True):
+        mask[start + 1 : start + count] = True
     return mask
+
+
+def _least(p: float, samples: int) -> float:
+    """The shortest run that is no accident anywhere in the data, where a sample equals the one before by chance `p`."""
+    return float(np.ceil(np.log(CHANCE / samples) / np.log(p))) + 1.0 if p > 0.0 else 2.0
+
+
+def _catches_up(force: Array, first: NDArray[np.intp], length: NDArray[np.intp], step: float) -> Mask:
+    """Of runs (r,), whether the force leaps by some steps at the end, and goes on much slower: no move does so."""
+    end = np.minimum(first + length, len(force) - 2)
+    leap, then = np.abs(force[end] - force[end - 1]), np.abs(force[end + 1] - force[end])
+    return np.asarray((first + length < len(force) - 1) & (leap > (LEAPS - 0.5) * step) & (then < leap / 3.0))
 
 
 def _no_accident(repeats: int, chance: float) -> bool:
@@ -420,7 +440,7 @@ def standing_off(residual: Array, good: Mask, suspect: Mask, step_N: float) -> M
     limit = far(e - middle)
     # where a step is as large as the noise, values come in heaps, of which no tail is foretold
     heaps = (e - middle)[np.abs(e - middle) <= HEAPS * step_N]
-    coarse = FAR * float(np.sqrt(np.mean(heaps**2))) if len(heaps) else 0.0
+    coarse = max(FAR * float(np.sqrt(np.mean(heaps**2))), NEXT * step_N) if len(heaps) else 0.0
     limits = np.maximum(np.where(suspect[index], 0.5, 1.0) * limit, coarse)
     reach = 3.0 * np.maximum(calm - float(np.median(calm)), 0.0)
     mask[index[_beyond(np.abs(e - middle), limits, reach)]] = True

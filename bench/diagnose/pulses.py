@@ -11,8 +11,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.felt_motion import resolution
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -25,8 +23,9 @@ STEEP = 3.0  # times what the samples before differ by
 WHOLLY = 0.2  # of a burst that goes both ways, so much at the most is not far off: it jumps, and does not swing
 
 
-def pulses(values: Array, good: Mask) -> Mask:
-    """Samples (m,) of force or of what a model leaves, among the `good` ones, that a pulse has made."""
+def pulses(values: Array, good: Mask, step_N: float) -> Mask:
+    """Samples (m,) of force or of what a model leaves, among the `good` ones, that a pulse has made. `step_N`: of the
+    channel, of which what a model leaves has none."""
     mask = np.zeros(len(values), dtype=bool)
     index = np.flatnonzero(good)
     y = values[index]
@@ -34,7 +33,7 @@ def pulses(values: Array, good: Mask) -> Mask:
         return mask
     bend = np.diff(y, 2)
     noise = 1.4826 * float(np.median(np.abs(bend - np.median(bend)))) / np.sqrt(6.0)
-    noise = max(noise, resolution(values) / np.sqrt(12.0), 1e-12)
+    noise = max(noise, step_N / np.sqrt(12.0), 1e-12)
     windows = np.lib.stride_tricks.sliding_window_view(y, BEFORE)[:-1]
     level, differ = np.median(windows, axis=1), np.ptp(windows, axis=1)
     jump = np.abs(y[BEFORE:] - level)

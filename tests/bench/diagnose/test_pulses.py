@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose.pulses import LONGEST, pulses
+from bench.felt_motion import resolution
 from tests.truth.cases import draw_case
 
 SEEDS = range(6)
@@ -27,7 +28,7 @@ def test_surges_are_told_by_how_they_begin_and_end(seed: int) -> None:
         length = int(rng.integers(3, LONGEST - 5))
         made[begin : begin + length] = True
         force[begin : begin + length] += (-1.0) ** k * surge(length)
-    found = pulses(force, np.ones(len(force), dtype=bool))
+    found = pulses(force, np.ones(len(force), dtype=bool), resolution(force))
     assert np.array_equal(found, made)
 
 
@@ -39,7 +40,7 @@ def test_bursts_of_wrong_readings_go_both_ways(seed: int) -> None:
         length = int(rng.integers(4, 16))
         made[begin : begin + length] = True
         force[begin : begin + length] += rng.choice([-1.0, 1.0], length) * rng.uniform(0.3, 0.8, length)
-    found = pulses(force, np.ones(len(force), dtype=bool))
+    found = pulses(force, np.ones(len(force), dtype=bool), resolution(force))
     assert np.array_equal(found, made)
 
 
@@ -52,10 +53,10 @@ def test_steps_ramps_and_rings_are_none(seed: int) -> None:
     rings = 0.8 * np.exp(-since / 25.0) * np.sin(2 * np.pi * since / 9.0)
     noise = 0.03 * rng.standard_t(4.0, 4000)
     for motion in (step, ramp + back, rings, noise):
-        assert not pulses(force + motion, np.ones(4000, dtype=bool)).any()
+        assert not pulses(force + motion, np.ones(4000, dtype=bool), resolution(force + motion)).any()
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_force_of_a_pad_has_none(seed: int) -> None:
     case = draw_case(seed, (), 1.0)
-    assert not pulses(case.force_N, np.ones(len(case.force_N), dtype=bool)).any()
+    assert not pulses(case.force_N, np.ones(len(case.force_N), dtype=bool), resolution(case.force_N)).any()
