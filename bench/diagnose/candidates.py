@@ -348,10 +348,10 @@ def _rippling(signatures: Signatures, effect: Effect, cause: Cause, most: int) -
 
     key = (effect.id, sine.form.name)
     if key not in signatures.waves:
-        signatures.waves[key] = ripple.Waves(column, signatures.residual)
+        signatures.waves[key] = ripple.Waves(signatures.residual)
     out = []
     most = 1 if ripple.two_periods(cause.form) else most
-    for values, promise in ripple.starts(cause.form, signatures.waves[key], most):
+    for values, promise in ripple.starts(cause.form, column, signatures.waves[key], most):
         size = min(max(values["amplitude"], 0.05 * amplitude.typical), 5 * amplitude.typical)
         values["amplitude"] = _inside(size, amplitude.lower, amplitude.upper)
         out.append(Start(cause.with_start(**values), promise))

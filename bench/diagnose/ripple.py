@@ -5,7 +5,6 @@ For given periods a sine and a second one are linear in four numbers, so that on
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Iterator
 
@@ -21,6 +20,10 @@ Array = NDArray[np.float64]
 PERIODS = 36
 TURNS = 24  # parts of a period
 RATIO = 2.5  # of the second sine to the first at the most, to start with
+
+Column = Callable[[float, float], Array]
+"""Change of the force (n,), in units of the noise, by a sine of amplitude 1, of a period in mm and a phase in rad,
+beyond what the pad can imitate."""
 
 Promise = tuple[float, int, int, Array]
 """(χ² that it takes, waves, waves of the second sine or 0, sizes of their sines and cosines)."""
@@ -48,28 +51,35 @@ def turned(cause: Cause) -> list[Cause]:
 
 
 class Waves:
-    """What a sine does at every period, for the forms of an effect that begin with the same one.
+    """What a sine does at every period, kept for the forms of an effect that begin with the same one. `residual` (n,):
+    what such sines are to take, in units of the noise.
 
-    `column`: change of the force (n,), in units of the noise, by a sine of amplitude 1, of a period in mm and a phase
-    in rad, beyond what the pad can imitate; `residual` (n,) likewise.
+    It does not keep who makes the columns, who keeps it: neither would go before the other does.
     """
 
-    def __init__(self, column: Callable[[float, float], Array], residual: Array) -> None:
-        self.column, self.residual = functools.cache(column), residual
+    def __init__(self, residual: Array) -> None:
+        self.residual = residual
+        self.columns: dict[tuple[float, float], Array] = {}  # by period and phase
         self.known: dict[tuple[float, tuple[tuple[int, int], ...]], list[Promise]] = {}
 
-    def promises(self, step: float, combined: tuple[tuple[int, int], ...]) -> list[Promise]:
+    def promises(self, column: Column, step: float, combined: tuple[tuple[int, int], ...]) -> list[Promise]:
         """Of pairs of waves by `step` 1/mm, the second 0 where there is none: what each promises, best first."""
         key = (step, combined)
         if key not in self.known:
-            self.known[key] = self._promises(step, combined)
+            self.known[key] = self._promises(column, step, combined)
         return self.known[key]
 
-    def _promises(self, step: float, combined: tuple[tuple[int, int], ...]) -> list[Promise]:
+    def _column(self, column: Column, period_mm: float, phase_rad: float) -> Array:
+        key = (period_mm, phase_rad)
+        if key not in self.columns:
+            self.columns[key] = column(period_mm, phase_rad)
+        return self.columns[key]
+
+    def _promises(self, column: Column, step: float, combined: tuple[tuple[int, int], ...]) -> list[Promise]:
         every = sorted({wave for pair in combined for wave in pair if wave})
-        pairs = {k: [self.column(1.0 / (k * step), phase) for phase in (0.0, 0.5 * math.pi)] for k in every}
+        pairs = {k: [self._column(column, 1.0 / (k * step), phase) for phase in (0.0, 0.5 * math.pi)] for k in every}
         at = {k: slice(2 * i, 2 * i + 2) for i, k in enumerate(pairs)}
-        columns = np.stack([column for pair in pairs.values() for column in pair], axis=1)
+        columns = np.stack([wave for pair in pairs.values() for wave in pair], axis=1)
         norm = np.linalg.norm(columns, axis=0)
         usable = np.isfinite(norm) & (norm > 1e-9)
         columns = np.where(usable, columns, 0.0)
@@ -83,13 +93,13 @@ class Waves:
         return sorted(found, key=lambda one: -one[0])
 
 
-def starts(form: Form, waves: Waves, most: int) -> Iterator[tuple[dict[str, float], float]]:
+def starts(form: Form, column: Column, waves: Waves, most: int) -> Iterator[tuple[dict[str, float], float]]:
     """(values to start from, χ² that they promise to take), best first, at periods apart from each other."""
     period = next(p for p in form.parameters if p.name == "period")
     lowest, highest = 1.0 / period.upper, 1.0 / period.lower
     step = lowest / math.ceil(lowest * PERIODS / max(highest - lowest, 1e-9 * highest))
     combined = tuple(_combined(form, range(round(lowest / step), int(highest / step) + 1)))
-    found = waves.promises(step, combined)
+    found = waves.promises(column, step, combined)
     taken: list[int] = []
     for promise, k, other, sizes in found:
         if len(taken) < most and all(abs(k - before) > 1 for before in taken):

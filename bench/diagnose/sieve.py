@@ -84,10 +84,9 @@ class Sieve:
         family: dict[str, list[Form]] = {}
         for effect, form in wanted:
             family.setdefault(effect.id, []).append(form)
-        effects = {effect.id: effect for effect, _ in wanted}
 
         def begun(id_: str) -> list[Start]:
-            return [start for form in family[id_] for start in starts(signatures, effects[id_], form)]
+            return [start for form in family[id_] for start in starts(signatures, effects.effect(id_), form)]
 
         with ThreadPoolExecutor(WORKERS) as pool:
             # a thread has all forms of an id, which may share what they begin with; those that take longest come first

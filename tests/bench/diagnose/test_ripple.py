@@ -34,7 +34,7 @@ def test_a_ripple_begins_near_its_period_with_its_phases_and_harmonic(id_, seed)
     ratio = float(rng.uniform(0.2, 0.8))
     felt = amplitude * (_wave(period, phase) + ratio * _wave(period / 2, second))
     shape = narrowed(effect(id_).form("harmonics"), REACH)
-    found = list(ripple.starts(shape, ripple.Waves(_wave, felt), 2))
+    found = list(ripple.starts(shape, _wave, ripple.Waves(felt), 2))
     values, promise = found[0]
     assert 0.8 * float(felt @ felt) < promise <= float(felt @ felt) * (1 + 1e-9)
     assert abs(3.0 / values["period"] - 3.0 / period) < 0.2
@@ -53,7 +53,7 @@ def test_two_ripples_begin_near_their_periods(id_, seed):
     ratio = float(rng.uniform(0.3, 0.8))
     felt = amplitude * (_wave(period, phase) + ratio * _wave(period / order, second))
     values, promise = next(
-        ripple.starts(narrowed(effect(id_).form("two_periods"), REACH), ripple.Waves(_wave, felt), 2)
+        ripple.starts(narrowed(effect(id_).form("two_periods"), REACH), _wave, ripple.Waves(felt), 2)
     )
     assert 0.8 * float(felt @ felt) < promise <= float(felt @ felt) * (1 + 1e-9)
     assert abs(3.0 / values["period"] - 3.0 / period) < 0.25
@@ -64,7 +64,7 @@ def test_starts_are_apart_and_within_bounds():
     rng = np.random.default_rng(7)
     shape = narrowed(effect("encoder_error").form("sine"), REACH)
     bounds = next(p for p in shape.parameters if p.name == "period")
-    found = list(ripple.starts(shape, ripple.Waves(_wave, rng.standard_normal(DEPTH_mm.size)), 3))
+    found = list(ripple.starts(shape, _wave, ripple.Waves(rng.standard_normal(DEPTH_mm.size)), 3))
     periods = [values["period"] for values, _ in found]
     assert len(set(periods)) == 3 and all(bounds.lower < p < bounds.upper for p in periods)
     assert [promise for _, promise in found] == sorted((promise for _, promise in found), reverse=True)
