@@ -32,6 +32,8 @@ since the last reversal, rises with it, and is a continuous function of position
 - `one_way`: Prandtl's element whose slider holds F_c (1 + differs) on the way in and F_c (1 − differs) on the way out,
   as of a seal whose lip points one way (B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer, 1991: the
   level depends on the direction). Wherever it slides, this is `coulomb` beside a bias; at the first sample it is none.
+- `tared_out`, `tared_in`: Prandtl's element that stood stuck, at −F_c where the probe had come out to where it stands or
+  at F_c where it had come in, when the force was set to zero: 0 and 2 F_c from there on, or −2 F_c and 0.
 - `smoothed`: F_c tanh(v/v_0), nothing at rest: what vibration makes of dry friction, and a film of oil (V.
   Pervozvanski, C. Canudas de Wit, Asymptotic analysis of the dither effect in systems with friction, Automatica 38,
   2002, 105–113).
@@ -45,6 +47,7 @@ State: last position, force, whether there was a position yet. A first position 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.waves import phase
@@ -229,6 +232,16 @@ def by_speed(dt: float, y: float, state: State, p: State) -> float:
     v = moved / dt
     level = p[0] * (1.0 + (p[1] - 1.0) * math.exp(-((v / p[2]) ** 2)))
     return level * math.tanh(v / p[4]) + p[3] * v
+
+
+def _tared_out(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `one_way` reads where all of it is felt on the way in."""
+    return (values["coulomb"], 1.0, values["presliding"])
+
+
+def _tared_in(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `one_way` reads where all of it is felt on the way out."""
+    return (values["coulomb"], -1.0, values["presliding"])
 
 
 def _term(name: str, what: str) -> Parameter:
@@ -428,6 +441,24 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": one_way},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="tared_out",
+            what="zeroed while it was stuck after a way out, so that all of it is felt on the way in",
+            parameters=(_COULOMB, _PRESLIDING),
+            sought=False,
+            blocks={"probe": one_way},
+            pack=_tared_out,
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="tared_in",
+            what="zeroed while it was stuck after a way in, so that all of it is felt on the way out",
+            parameters=(_COULOMB, _PRESLIDING),
+            sought=False,
+            blocks={"probe": one_way},
+            pack=_tared_in,
             state=(0.0, 0.0, 0.0),
         ),
         Form(

@@ -148,6 +148,14 @@ class TestFriction:
         assert force[0] == 0.0
         assert_allclose(force[1:], beside[1:], atol=1e-12)
 
+    @pytest.mark.parametrize(("form", "came"), [("tared_out", -1.0), ("tared_in", 1.0)])
+    def test_friction_under_a_tare_is_that_which_went_on_less_what_was_there(self, form: str, came: float) -> None:
+        before = np.linspace(-0.1 * came, 0.0, 11)
+        x = np.concatenate([np.linspace(0.0, 1.0, 101), np.linspace(1.0, -0.8, 181)])
+        whole = simulate(AIR, [active("friction", coulomb=0.1)], np.arange(11 + x.size) * 1e-3, np.append(before, x))
+        force = simulate(AIR, [active("friction", form, coulomb=0.1)], np.arange(x.size) * 1e-3, x)
+        assert_allclose(force, whole[11:] - whole[10], atol=1e-12)
+
     def test_load_dependent_friction_grows_with_depth(self) -> None:
         x = ramp(2.0, 2001)
         grows = active("friction", "load_dependent", coulomb=0.05, load=0.5)

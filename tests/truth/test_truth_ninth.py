@@ -19,7 +19,7 @@ FRAMES = ("disc_spring", "gas_strut")
 
 def test_they_are_of_the_ninth():
     assert set(FRAMES) <= set(shapes_of("frame_compliance", "ninth"))
-    assert set(shapes_of("friction", "ninth")) >= {"ribs", "rubber_bell", "ring_rolls"}
+    assert set(shapes_of("friction", "ninth")) >= {"ribs", "rubber_bell", "ring_rolls", "tared"}
     for id in ("backlash", "inertia", "cogging", "encoder_error"):
         assert len(shapes_of(id, "ninth")) >= 2
 
@@ -245,6 +245,19 @@ def test_a_ring_that_rolls(seed):
     assert 0.0995 <= way <= 0.401 and np.all(out[round(way / 1e-4) + 30 :] == 1.0)
     # The first way is a half of that, and 30 µm of another turn are rolled.
     assert slides * 1e-4 == pytest.approx(way / 2, abs=4e-3) and force[-1] == pytest.approx(rolls)
+
+
+def test_friction_that_was_taken_for_zero():
+    ways = set()
+    for seed in range(8):
+        _, told, build = hidden("friction", "tared", seed=seed)
+        x = np.concatenate([np.full(100, -2.0), np.linspace(-2, -1, 10_001), np.linspace(-1, -2, 10_001)[1:]])
+        force = felt(build, x) / told["coulomb"]
+        assert np.all(force[:100] == 0.0)
+        into, out = force[5000], force[15_000]
+        assert into - out == pytest.approx(2.0) and {round(abs(into)), round(abs(out))} == {0, 2}
+        ways.add(round(into))
+    assert ways == {0, 2}
 
 
 def test_waves_in_a_spring_that_hangs_free():

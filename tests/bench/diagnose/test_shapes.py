@@ -54,6 +54,7 @@ def stated(fit: Fit, name: str) -> tuple[float, float]:
         pytest.param("depth_dependent_relaxation", "knee", "linear", "slope", "knee", marks=pytest.mark.long),
         ("cogging", "iron", "sine", "period", "trailing"),
         ("inertia", "cable_chain", "rigid", "mass", "growing"),
+        ("friction", "tared", "coulomb", "coulomb", "tared_out"),
         pytest.param("damage", "hyperbolic", "linear", "rate", "hyperbolic", marks=pytest.mark.long),
     ],
 )

@@ -194,14 +194,16 @@ def _rolling_ring(x, presliding, way, rolls):
     return out
 
 
-@more_shapes("friction", "ribs", "rubber_bell", "ring_rolls")
+@more_shapes("friction", "ribs", "rubber_bell", "ring_rolls", "tared")
 def friction(build: Build, shape: str, size: float) -> dict[str, float]:
-    """A wiper that snaps from rib to rib; rubber, which rubs most at some speed; or a ring that rolls before it slides.
+    """A wiper that snaps from rib to rib; rubber, which rubs most at some speed; a ring that rolls before it slides; or
+    dry friction that was taken for zero.
 
     `ribs`: 40 to 150 µm apart, the spring so soft that η is 3 to 6; stated is the mean as it slides. `rubber_bell`:
     1 + b e^{−(ln v/v_p)²/w²}, b of 0.6 to 1.5, v_p of 5 to 30 mm/s, w of 1 to 1.6; stated is the mean over the
     logarithm of speed from 1 to 100 mm/s. `ring_rolls`: over 0.1 to 0.4 mm after each turn, at 0.4 to 0.65 of what it
-    takes to slide, which is stated.
+    takes to slide, which is stated. `tared`: the axis had come to its place one way or the other, and stood stuck when
+    the force was set to zero; stated is what slides, which is on either side of what was zeroed.
     """
     rng, coulomb = build.rng, 0.05 * size * spread(build.rng, 0.7, 1.6)
     wave, soft, presliding = spread(rng, 0.04, 0.15), float(rng.uniform(3.0, 6.0)), 1.5e-3 * spread(rng, 0.6, 1.6)
@@ -211,12 +213,17 @@ def friction(build: Build, shape: str, size: float) -> dict[str, float]:
     slides = float(np.mean(_ribs(np.linspace(0.0, 12.0, 24_001), 1.0, soft)[12_001:]))
     bell = erf(np.log(100 / peak) / wide) - erf(np.log(1 / peak) / wide)
     mean = 1 + more * np.sqrt(np.pi) / 2 * wide * bell / np.log(100)
+    came = float(rng.choice([-1.0, 1.0]))
 
     def act(t, x, v, a):
         if shape == "ribs":
             return coulomb / slides * _ribs(x, wave, soft)
         if shape == "ring_rolls":
             return coulomb * _rolling_ring(x, presliding, way, rolls)
+        if shape == "tared":
+            before = np.concatenate([x[:1] - 9 * came * presliding, x])
+            force = coulomb * _sliding(before, presliding, np.ones(len(before)), np.ones(len(before)))[1:]
+            return force - force[0]
         level = (1 + more * np.exp(-((np.log(np.maximum(np.abs(v), 1e-9) / peak) / wide) ** 2))) / mean
         return coulomb * _sliding(x, presliding, level, level)
 
