@@ -32,8 +32,8 @@ since the last reversal, rises with it, and is a continuous function of position
 - `one_way`: Prandtl's element whose slider holds F_c (1 + differs) on the way in and F_c (1 − differs) on the way out,
   as of a seal whose lip points one way (B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer, 1991: the
   level depends on the direction). Wherever it slides, this is `coulomb` beside a bias; at the first sample it is none.
-- `tared_out`, `tared_in`: Prandtl's element that stood stuck, at −F_c where the probe had come out to where it stands or
-  at F_c where it had come in, when the force was set to zero: 0 and 2 F_c from there on, or −2 F_c and 0.
+- `tared_out`, `tared_in`: Prandtl's element that stood stuck, at −F_c where the probe had come out to where it stands
+  or at F_c where it had come in, when the force was set to zero: 0 and 2 F_c from there on, or −2 F_c and 0.
 - `smoothed`: F_c tanh(v/v_0), nothing at rest: what vibration makes of dry friction, and a film of oil (V.
   Pervozvanski, C. Canudas de Wit, Asymptotic analysis of the dither effect in systems with friction, Automatica 38,
   2002, 105–113).
