@@ -57,7 +57,7 @@ def test_derivatives_are_those_of_the_way(smoothing: Smoothing) -> None:
 
 
 @pytest.mark.parametrize("smoothing", [PLAIN, *SMOOTHINGS])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2))])
 def test_what_smooths_the_moves_is_found_in_noisy_positions(smoothing: Smoothing, seed: int) -> None:
     rng, t = np.random.default_rng(seed), np.arange(0.0, 12.0, 2e-3)
     ways = rng.uniform(0.4, 1.5, 5) * [1, -1, 1, 1, -1]

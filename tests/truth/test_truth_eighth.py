@@ -64,7 +64,7 @@ def test_a_clamp_that_works_loose(seed):
 
 
 @pytest.mark.parametrize("shape", FRAMES)
-@pytest.mark.parametrize("other", OTHERS)
+@pytest.mark.parametrize("other", [*OTHERS[:2], *(pytest.param(other, marks=pytest.mark.long) for other in OTHERS[2:])])
 def test_the_frame_goes_with_other_effects(shape, other):
     shapes = {"frame_compliance": shape, other: shapes_of(other, "first")[0]}
     plain = {"motion": SHORT, "rate_hz": 500.0, "law": "power", "contact": "unilateral"}

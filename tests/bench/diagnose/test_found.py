@@ -73,15 +73,16 @@ def test_hidden_effects_are_named(group, turn, tmp_path):
     assert len(wrong) <= len(asked) // 3, wrong
 
 
-def test_nothing_hidden_is_consistent(tmp_path):
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 8), marks=pytest.mark.long)])
+def test_nothing_hidden_is_consistent(seeds, tmp_path):
     said = {}
-    for seed in range(4):
+    for seed in seeds:
         case = null_case(seed, noise_kind=NOISES[seed % 4], rate_hz=100.0)
         said[seed] = diagnosed(case, case.write(tmp_path / str(seed)))["said"]
     alarms = {
         seed: [c["id"] for c in s["causes"]] or s["verdict"] for seed, s in said.items() if s["verdict"] != "consistent"
     }
-    assert len(alarms) <= 1, alarms
+    assert len(alarms) <= len(seeds) // 4, alarms
 
 
 def test_found_through_the_wire(tmp_path, padbench):

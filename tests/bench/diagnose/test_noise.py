@@ -27,7 +27,9 @@ def _told(case: Case) -> float:
     return force_noise(m, faults(force).good).force_N / case.truth.noise.std
 
 
-@pytest.mark.parametrize("kind", ["white", "coloured", "quantised", "heavy"])
+@pytest.mark.parametrize(
+    "kind", ["coloured", "quantised", *(pytest.param(k, marks=pytest.mark.long) for k in ("white", "heavy"))]
+)
 def test_noise_of_any_kind_is_told_by_the_holds(kind):
     for seed in SEEDS:
         assert _told(draw_case(seed, (), noise_kind=kind, own_clock=False)) == pytest.approx(1.0, abs=0.1)

@@ -63,6 +63,7 @@ def test_one_press_names_nothing_surely_that_acts_with_the_motion(ids):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_one_press_tells_a_hum_all_the_same():
     d = pressed_once("mains_hum", 1)
     assert d.causes[0].id == "mains_hum" and d.causes[0].confidence > TOLD_ONCE and not d.seen_once

@@ -17,7 +17,7 @@ def with_friction(tmp_path, base: str, coulomb: float, **simulation) -> Done:
 
 
 @pytest.mark.parametrize("base", ["simulated", "simulated_iai", "simulated_smc_lec", "simulated_balance"])
-@pytest.mark.parametrize("coulomb", [0.08, 0.3])
+@pytest.mark.parametrize("coulomb", [pytest.param(0.08, marks=pytest.mark.long), 0.3])
 def test_the_surface_is_found_behind_friction(tmp_path, base, coulomb):
     done = with_friction(tmp_path, base, coulomb)
     assert done.outcome.cause is None

@@ -299,7 +299,7 @@ def hastened(name: str) -> dict[str, Any]:
     return protocol
 
 
-ALIKE = {"sweep", "long_hold", "precondition", "first_contact", "rich"}
+ALIKE = {"staircase", "sweep", "long_hold", "precondition", "first_contact", "rich"}
 """Of moves that the others have too."""
 
 
