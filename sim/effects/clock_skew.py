@@ -9,6 +9,12 @@ Over the time T since the first force sample the force clock counts T (1 + skew 
 - `held`: right as long as it has its reference, up to a share `free_from` of the data, and free from there (ITU-T
   G.810, Definitions and terminology for synchronization networks: holdover). `skew` is the mean over the data, whose
   middle is `at_time`.
+- `set_once`: at a share `set_at` of the data it is set, which undoes a share `undone` of what it has gained by then; it
+  runs on as before, and `skew` is its rate before and after (Mills: a clock that is far off is stepped, not slewed).
+  The step is spread over a hundredth of the data, so that a fit can find its way to it.
+- `wandering`: the rate is skew · (1 + Σ c_k cos(kπ t/T)), k from 1 to 4, over the length T of the data, twice
+  `at_time`, so that `skew` is its mean over them: warmth, a loop that seeks its reference, a leap second smeared over a
+  while (ITU-T G.810: wander).
 
 A single stamp without an array around it (a simulated device that is read out) counts from time 0.
 
@@ -18,6 +24,7 @@ Reference: D. L. Mills, Internet time synchronization: the network time protocol
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -47,6 +54,25 @@ def held(values: Mapping[str, float], stamp_s: Array) -> Array:
     return np.asarray(stamp_s - 1e-6 * values["skew"] * free)
 
 
+def set_once(values: Mapping[str, float], stamp_s: Array) -> Array:
+    """When forces stamped `stamp_s` were felt, s."""
+    since, span = stamp_s - origin(stamp_s), max(2.0 * values["at_time"], 1e-9)
+    set_s = values["set_at"] * span
+    undone = 0.5 * values["undone"] * (1.0 + np.tanh((since - set_s) / (_SET_WITHIN * span)))
+    return np.asarray(stamp_s - 1e-6 * values["skew"] * (since - set_s * undone))
+
+
+def wandering(values: Mapping[str, float], stamp_s: Array) -> Array:
+    """When forces stamped `stamp_s` were felt, s."""
+    since = stamp_s - origin(stamp_s)
+    slow = 0.5 * math.pi / max(values["at_time"], 1e-9)
+    more = sum(values[f"wave_{k}"] * np.sin(k * slow * since) / (k * slow) for k in _WAVES)
+    return np.asarray(stamp_s - 1e-6 * values["skew"] * (since + more))
+
+
+_WAVES = range(1, 5)
+_SET_WITHIN = 0.01
+_SET_AT = (0.2, 0.35, 0.5, 0.65, 0.8)
 _SKEW = Parameter(
     "skew",
     "ppm",
@@ -58,6 +84,11 @@ _SKEW = Parameter(
     amplitude=True,
     starts=(-300.0, 300.0),
 )
+
+
+def _wave(k: int) -> Parameter:
+    return Parameter(f"wave_{k}", "1", -3.0, 3.0, 0.0, f"{k} half waves of the rate over the data, over `skew`")
+
 
 EFFECT = Effect(
     id="clock_skew",
@@ -97,6 +128,29 @@ EFFECT = Effect(
                 Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the time of which `skew` is the mean", fixed=True),
             ),
             time_shift=held,
+            sought=False,
+        ),
+        Form(
+            name="set_once",
+            what="ever further apart, but for once that it was set",
+            parameters=(
+                _SKEW,
+                Parameter("undone", "1", 0.0, 1.0, 0.3, "share of its gain that was undone", starts=(0.3, 0.9)),
+                Parameter("set_at", "1", 0.02, 0.98, 0.5, "share of the data at which it was set", starts=_SET_AT),
+                Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the length of the data", fixed=True),
+            ),
+            time_shift=set_once,
+            sought=False,
+        ),
+        Form(
+            name="wandering",
+            what="now faster and now slower apart",
+            parameters=(
+                _SKEW,
+                *(_wave(k) for k in _WAVES),
+                Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the time of which `skew` is the mean", fixed=True),
+            ),
+            time_shift=wandering,
             sought=False,
         ),
     ),

@@ -174,6 +174,28 @@ def test_a_clock_that_loses_its_reference() -> None:
     assert_allclose(late[[0, 50, 100, 250, 400]], [0.0, 0.0, 0.0, 0.004, 0.008], atol=1e-12)
 
 
+def test_a_clock_that_is_set_once() -> None:
+    stamps = 5.0 + np.linspace(0.0, 40.0, 401)
+    values = {"skew": -200.0, "undone": 0.25, "set_at": 0.6, "at_time": 20.0}
+    set_once = effect("clock_skew").form("set_once")
+    assert set_once.time_shift is not None
+    late = stamps - set_once.time_shift(values, stamps)
+    # Of 4.8 ms that it has lost after 24 s a quarter is made up for.
+    assert_allclose(late[[0, 100, 200, 280, 400]], [0.0, -2e-3, -4e-3, -5.6e-3 + 1.2e-3, -8e-3 + 1.2e-3], atol=1e-8)
+
+
+def test_a_clock_whose_rate_wanders() -> None:
+    stamps = 5.0 + np.linspace(0.0, 40.0, 4001)
+    waves = {f"wave_{k}": 0.0 for k in range(1, 5)} | {"wave_1": -0.5, "wave_3": 0.8}
+    wanders = effect("clock_skew").form("wandering")
+    assert wanders.time_shift is not None
+    late = stamps - wanders.time_shift({"skew": 150.0, "at_time": 20.0, **waves}, stamps)
+    share = np.linspace(0.0, 1.0, 4001)
+    rate = 150e-6 * (1 - 0.5 * np.cos(math.pi * share) + 0.8 * np.cos(3 * math.pi * share))
+    assert_allclose(np.gradient(late, 0.01)[1:-1], rate[1:-1], atol=1e-9)
+    assert_allclose(late[-1], 150e-6 * 40.0)
+
+
 def test_a_filter_of_finite_response() -> None:
     t = np.linspace(0.0, 0.4, 4001)
     filtered = active("sensor_lag", "finite", time_constant=0.02, width=0.25)

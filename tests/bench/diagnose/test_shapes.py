@@ -55,6 +55,7 @@ def stated(fit: Fit, name: str) -> tuple[float, float]:
         ("cogging", "iron", "sine", "period", "trailing"),
         ("inertia", "cable_chain", "rigid", "mass", "growing"),
         ("friction", "tared", "coulomb", "coulomb", "tared_out"),
+        pytest.param("clock_skew", "resynchronised", "linear", "skew", "set_once", marks=pytest.mark.long),
         pytest.param("damage", "hyperbolic", "linear", "rate", "hyperbolic", marks=pytest.mark.long),
     ],
 )
