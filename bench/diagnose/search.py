@@ -11,7 +11,20 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .candidates import CHANNEL, Signatures, alike, combinations, forms, narrowed, starts
+from sim import effects
+
+from .candidates import (
+    CHANNEL,
+    LONGEST_PERIOD,
+    LONGEST_REPORTED,
+    Signatures,
+    alike,
+    combinations,
+    forms,
+    narrowed,
+    starts,
+    with_periods,
+)
 from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
 from .felt_errors import felt_errors, redrawn
@@ -38,6 +51,7 @@ MOST_CAUSES = 3
 SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
 RIVALS = 2  # beside the best, that are asked for their best shapes
+LONG_WAVES = 3  # starts of a wave that is longer than those sought
 SHAPES = 6  # starts of other forms of the causes found that are carried on
 COMPARED = 5  # rivals of a cause that is compared anew
 LATER_BY_CHANCE = 1.3  # times what was known of it
@@ -170,10 +184,30 @@ class Search(Sieve):
         return None
 
     def _note(self, path: Path, turn: _Turn) -> None:
-        path.rivals.append([*turn.ranked, *turn.small])
+        path.rivals.append(self._with_a_long_wave(path.fits[-1], [*turn.ranked, *turn.small]))
         path.tried.append(turn.tried)
         path.measures.append(Measure(path.fits[-1].chi2, self.expected, self.effective, self.prepared.memory))
         path.evidence.append(turn.found)
+
+    def _with_a_long_wave(self, now: Fit, ranked: list[Trial]) -> list[Trial]:
+        """The candidates, behind another law an error of the position that repeats over a longer way than is sought,
+        where it takes more than one of those: part of one wave is any curve, so that it is no candidate by itself, but
+        nor do these data exclude it."""
+        if ranked[0].id != "elastic_law" or not self.reach.rich or now.structure.in_air:
+            return ranked
+        effect = effects.effect("encoder_error")
+        depth_mm = self.prepared.depth_mm
+        form = with_periods(effect.forms[0], LONGEST_REPORTED * depth_mm, LONGEST_PERIOD * depth_mm)
+        begun = starts(Signatures(self.short, now), effect, form, LONG_WAVES)
+        tried = [t for t in (self._joined(now, s.cause, MORE, None) for s in begun) if t is not None]
+        if not tried:
+            return ranked
+        wave = self._carried(min(tried, key=lambda t: t.fit.chi2), ALL)
+        known = next((t for t in ranked if t.id == wave.id), None)
+        if not believable(wave.fit, self.prepared) or (known is not None and known.fit.chi2 <= wave.fit.chi2):
+            return ranked
+        others = sorted([wave, *(t for t in ranked[1:] if t is not known)], key=lambda t: t.score)
+        return [ranked[0], *others]
 
     def _compare(self, path: Path) -> None:
         """Causes that came in amid others which have gone since, beside what stood near them there, where the path has

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from bench.diagnose import diagnose
 from bench.diagnose.channel import faults, not_of_the_motion
 from bench.diagnose.data import Data, prepare
 from bench.diagnose.diagnose import believed_structure
@@ -23,6 +25,8 @@ from sim.pad import Pad
 from sim.relaxation import Relaxation
 from tests.bench.diagnose.small import measurement
 from tests.truth.cases import Case, draw_case
+
+PLAIN: dict[str, Any] = {"protocol": "staircase", "rate_hz": 150.0, "jitter": "none", "own_clock": False}
 
 
 def begun(c: Case) -> tuple[Search, Fit]:
@@ -222,3 +226,15 @@ def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_o
         patch.setattr("bench.diagnose.search.believable", lambda *_: True)
         patch.setattr("bench.diagnose.search.least_gain", lambda *_: 0.0)
         assert asked._plain_first(path, [curve, plain])[0].id == first
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_a_wave_as_long_as_the_pad_is_deep_stands_beside_another_law(seed):
+    """A part of one wave of the encoder is any curve of the depth; which it is these data cannot tell."""
+    c = draw_case(seed, (), noise_kind="white", law="power", **PLAIN)
+    depth_mm = float(np.nanmax(c.position_mm))
+    wave = 0.015 * np.sin(2.0 * np.pi * c.position_mm / (0.9 * depth_mm) + 1.5 * seed)
+    said = diagnose(measurement(replace(c, position_mm=c.position_mm + wave)), Model.from_dict(c.believed))
+    first = said.causes[0]
+    assert "encoder_error" in {first.id, *(a.id for a in first.alternatives if not a.excluded)}
