@@ -100,18 +100,21 @@ def hum_cause(line: Line) -> Cause:
         return cause_of(hum, hum.form("loaded_harmonics" if third else "loaded"), values | third | own)
     if line.swing:
         names = ("period", "swell", "swell_phase", "wander", "wander_phase")
-        return cause_of(hum, hum.form("swinging"), values | dict(zip(names, line.swing, strict=True)))
+        values |= dict(zip(names, line.swing, strict=True))
+        if not (third or line.higher):
+            return cause_of(hum, hum.form("swinging"), values)
     if line.bursts:
         own = dict(zip(("waves", "fed", "first"), map(float, line.bursts), strict=True))
         return cause_of(hum, hum.form("bursts"), values | own)
     if line.fires_rad:
         return cause_of(hum, hum.form("dimmed"), values | {"fires": line.fires_rad})
-    if line.higher:
+    if line.higher or line.swing:
         found = {3: (line.ratio, line.third_phase_rad)} | {order: (ratio, angle) for order, ratio, angle in line.higher}
-        form = hum.form("distorted" if any(order % 2 == 0 for order in found) else "flat_topped")
-        # behind amplitude, frequency and phase stand pairs of share and phase, in the order of the harmonics
+        plain = "distorted" if any(order % 2 == 0 for order in found) else "flat_topped"
+        form = hum.form("swinging_harmonics" if line.swing else plain)
+        # behind the others stand pairs of share and phase, in the order of the harmonics
         shares = [p.name for p in form.parameters[len(values) :]]
-        orders = range(2, 8) if form.name == "distorted" else (3, 5, 7)
+        orders = (3, 5, 7) if form.name == "flat_topped" else range(2, 8)
         pairs = (part for order in orders for part in found.get(order, (0.0, 0.0)))
         return cause_of(hum, form, values | dict(zip(shares, pairs, strict=True)))
     if third:

@@ -64,9 +64,17 @@ class Line:
         rate = 1.0 / self.sample_s
         return bool(_of_grids(float(_folded(self.frequency_Hz, rate)), rate))
 
+    def angle(self, time_s: Array) -> Array:
+        """Of the first harmonic at times (n,) since its start, from 0 where it does not wander, rad."""
+        steady = 2.0 * np.pi * self.frequency_Hz * time_s
+        if not self.swing:
+            return np.asarray(steady)
+        period, _, _, wander, wander_phase = self.swing
+        return np.asarray(steady + wander * np.sin(2.0 * np.pi * time_s / period + wander_phase))
+
     def force_N(self, time_s: Array, load_N: Array) -> Array:
         """The line at times (n,) since its start, under loads (n,)."""
-        angle = 2.0 * np.pi * self.frequency_Hz * time_s
+        angle = self.angle(time_s)
         swells = self.amplitude_N * (1.0 + self.growth_1_N * (load_N - self.at_N))
         first = angle + self.phase_rad
         if self.fires_rad:
@@ -77,12 +85,8 @@ class Line:
             on = (np.floor(first / (2.0 * np.pi)) - begins) % waves < fed
             return np.asarray(swells * (waves / fed) * on * np.sin(first))
         if self.swing:
-            period, swell, swell_phase, wander, wander_phase = self.swing
-            slow = 2.0 * np.pi * time_s / period
-            swells, first = (
-                swells * (1.0 + swell * np.sin(slow + swell_phase)),
-                first + wander * np.sin(slow + wander_phase),
-            )
+            period, swell, swell_phase, _, _ = self.swing
+            swells = swells * (1.0 + swell * np.sin(2.0 * np.pi * time_s / period + swell_phase))
         others = [(3, self.ratio, self.third_phase_rad), *self.higher]
         wave = np.sin(first) + sum(ratio * np.sin(order * angle + phase) for order, ratio, phase in others if ratio)
         return np.asarray(swells * wave)
@@ -133,7 +137,9 @@ def find(start_s: float, parts: list[Part], stamp_s: Array, force_N: Array) -> L
         at = float(np.mean(force_N))  # what is stated is the mean over the run
         there = 1.0 + growth * (at - float(np.mean(load)))
         shapes.append(replace(shapes[0], amplitude_N=amplitude * there, growth_1_N=growth / there, at_N=at, higher=()))
-    shapes += [s for s in (_swinging(line, parts, start_s), _bursting(line, t, e)) if s is not None]
+    swings = _swinging(line, parts, start_s)
+    shapes += [] if swings is None else [_with_harmonics(swings, t, e, least, highest, spacing)]
+    shapes += [s for s in [_bursting(line, t, e)] if s is not None]
     shapes += [_dimmed(line, t, e)] if shapes[0].ratio or shapes[0].higher else []
     # the plainest, unless another one takes more than its numbers do by chance
     return min(shapes, key=lambda one: float(np.sum((e - one.force_N(t, load)) ** 2)) + least * _numbers(one))
@@ -191,13 +197,15 @@ def _with_harmonics(line: Line, t: Array, e: Array, least: float, highest: float
     f, rate = line.frequency_Hz, 1.0 / line.sample_s
     seen, found = [float(_folded(f, rate))], []
     left = e - line.force_N(t, t)  # between holds nothing is seen: a line leaks far, into what is folded beside it
+    even = line.angle(t) / (2.0 * np.pi * f)  # times at which a line that wanders would be steady
     for order in HARMONICS:
         here = float(_folded(order * f, rate))
         if LOWEST_HZ < here < highest and min(abs(here - other) for other in seen) > 16.0 * spacing:
-            more, sine, cosine = _taken(t, left, order * f)
+            more, sine, cosine = _taken(even, left, order * f)
             if more > least:
                 seen.append(here)
-                left = left - sine * np.sin(2.0 * np.pi * order * f * t) - cosine * np.cos(2.0 * np.pi * order * f * t)
+                angle = 2.0 * np.pi * order * f * even
+                left = left - sine * np.sin(angle) - cosine * np.cos(angle)
                 found.append((order, float(np.hypot(sine, cosine)) / line.amplitude_N, float(np.arctan2(cosine, sine))))
     third = next(((ratio, phase) for order, ratio, phase in found if order == 3), (0.0, 0.0))
     return replace(line, ratio=third[0], third_phase_rad=third[1], higher=tuple(one for one in found if one[0] != 3))

@@ -10,6 +10,7 @@ Phases are at the first sample.
 - `distorted`: with all harmonics from the second to the seventh; rectifiers of half waves make the even ones.
 - `swinging`: amplitude and phase swing slowly, amplitude · (1 + swell · sin(2πt/period + …)) ·
   sin(2πft + phase + wander · sin(2πt/period + …)), as the grid's frequency does and what else it feeds.
+- `swinging_harmonics`: the same with its harmonics up to the seventh, whose phases wander so many times as far.
 - `bursts`: let through for `fed` of every `waves` whole waves, from wave number `first` on, as heaters are that are
   switched at zero crossings (IEC 61000-3-3, burst firing); `amplitude` is the mean over time, waves begin at phase 0.
 - `loaded`, `loaded_harmonics`: the same, times 1 + growth · (F − at_force) of the force F at the cell. A bridge
@@ -93,6 +94,18 @@ def swinging(dt: float, force: float, state: State, p: State) -> float:
     slow = 2.0 * math.pi * state[0] / p[3]
     angle = 2.0 * math.pi * p[1] * state[0] + p[2] + p[6] * math.sin(slow + p[7])
     return force + p[0] * (1.0 + p[4] * math.sin(slow + p[5])) * math.sin(angle)
+
+
+@block
+def swinging_harmonics(dt: float, force: float, state: State, p: State) -> float:
+    """p = as of `swinging`, then (ratio, phase) of the second to the seventh."""
+    state[0] += dt
+    slow = 2.0 * math.pi * state[0] / p[3]
+    angle = 2.0 * math.pi * p[1] * state[0] + p[6] * math.sin(slow + p[7])
+    wave = math.sin(angle + p[2])
+    for k in range(6):
+        wave += p[8 + 2 * k] * math.sin((k + 2.0) * angle + p[9 + 2 * k])
+    return force + p[0] * (1.0 + p[4] * math.sin(slow + p[5])) * wave
 
 
 @block
@@ -245,6 +258,14 @@ EFFECT = Effect(
             parameters=(_AMPLITUDE, _FREQUENCY, _PHASE, *_SWING),
             sought=False,
             blocks={"sensor": swinging},
+            state=(0.0,),
+        ),
+        Form(
+            name="swinging_harmonics",
+            what="a sine and its harmonics up to the seventh, of which amplitude and phase swing slowly",
+            parameters=(_AMPLITUDE, _FREQUENCY, _PHASE, *_SWING, *_EACH),
+            sought=False,
+            blocks={"sensor": swinging_harmonics},
             state=(0.0,),
         ),
         Form(

@@ -319,6 +319,12 @@ class TestBiasDriftHum:
         slow = 2 * math.pi * t / 4.0
         angle = 2 * math.pi * 50 * t + 0.5 * np.sin(slow + 1.0)
         assert_allclose(out, 0.1 * (1 + 0.4 * np.sin(slow + 0.3)) * np.sin(angle), atol=1e-9)
+        names = ("second", "third", "fourth", "fifth", "sixth", "seventh")
+        higher = dict.fromkeys(names, 0.0) | {"third": 0.3, "third_phase": -0.7, "sixth": 0.1}
+        form, numbers = "swinging_harmonics", {"amplitude": 0.1, "frequency": 50.0, **swing, **higher}
+        out = sense(active("mains_hum", form, **numbers), t, np.zeros(t.size))
+        wave = np.sin(angle) + 0.3 * np.sin(3 * angle - 0.7) + 0.1 * np.sin(6 * angle)
+        assert_allclose(out, 0.1 * (1 + 0.4 * np.sin(slow + 0.3)) * wave, atol=1e-9)
 
     def test_hum_that_grows_with_the_load(self) -> None:
         t = np.arange(4000) * 1e-3
