@@ -29,7 +29,7 @@ CHANNEL = ("outliers", "stuck_samples", "mains_hum")  # found by detectors, not 
 MOST_STARTS = 96
 LOWEST_RINGING_HZ, FREQUENCIES = 4.0, 32
 NEARBY, ABOUT = 7, 2.0  # frequencies about one that was found, and up to how many times it, either way
-SHORTEST = 0.12  # of the longest period
+SHORTEST, SHORTEST_IN_AIR = 0.12, 0.03  # of the longest period
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
@@ -65,10 +65,13 @@ class Reach:
     rich: bool = True
     """Whether depths are held, or passed again: what depends on the position alone differs there from a law, which
     relaxes. In one pass over the depth it is told only by many periods."""
+    in_air: bool = False
+    """Whether there is no pad: then the moves show the ripple itself, all along the travel."""
 
     @classmethod
-    def of(cls, data: Data, sample_s: float, depth_mm: float, force_N: float, rich: bool = True) -> Reach:
-        """That of some data, of which the pad is pressed so deep and bears so much at the most."""
+    def of(cls, data: Data, structure: Structure, sample_s: float, rich: bool = True) -> Reach:
+        """That of some data, and of how deep a structure's pad is pressed there and how much it bears at the most."""
+        depth_mm, force_N = structure.pad.depth_mm, structure.pad.force_N
         into_mm = np.maximum(data.position_mm[:: max(1, data.size // COARSE)], 0.0)
         return cls(
             sample_s=sample_s,
@@ -78,6 +81,7 @@ class Reach:
             force_N=force_N,
             changes_N=max(float(np.sum(np.abs(np.diff(into_mm)))) * force_N / depth_mm, force_N),
             rich=rich,
+            in_air=structure.in_air,
         )
 
 
@@ -125,7 +129,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         upper = min(upper, 3.0 * reach.span_s)
     elif p.name == "period":
         # some levels of depth are met by any ripple that is short enough
-        lower, upper = max(lower, SHORTEST * longest_mm), min(upper, longest_mm)
+        shortest = SHORTEST_IN_AIR if reach.in_air else SHORTEST
+        lower, upper = max(lower, shortest * longest_mm), min(upper, longest_mm)
     elif p.name == "range":  # a pull beyond the widest gap is a bias; a pad may lag by half its depth
         upper = min(upper, reach.travel_mm - 0.5 * reach.depth_mm)
     elif p.name == "already":  # pressed before as deep as this run goes: then nothing softens in it, and it is a law

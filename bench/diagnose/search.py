@@ -115,8 +115,14 @@ class Search(Sieve):
         """Causes one after the other while each pays; then those that others have made needless go."""
         path = Path([base])
         asked = 1  # fits on the path when the causes' shapes were last asked
-        begun = time.process_time()
-        while len(path.fits) <= MOST_CAUSES and time.process_time() - begun < LONGEST_S:
+        begun = turned_at = time.process_time()
+        while len(path.fits) <= MOST_CAUSES:
+            now = time.process_time()
+            # a third cause is not begun where it would not be done in time: most often there is none
+            will_take = now - turned_at if len(path.fits) > 2 else 0.0
+            if now - begun + will_take >= LONGEST_S:
+                break
+            turned_at = now
             self._whitened(path)
             self._felt(path)
             turn = self._turn(path)

@@ -163,8 +163,8 @@ def _comparable(one: Form, other: Form) -> bool:
 def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     """Another shape in place of a cause of a fit, carried to its minimum; None where it makes no plant."""
     structure, values = lead.structure, lead.structure.values(lead.x)
-    cause, pad, end = structure.causes[index], structure.pad, len(structure.pad.coordinates)
-    shape = narrowed(form, Reach.of(short, short.sample_s, pad.depth_mm, pad.force_N))
+    cause, end = structure.causes[index], len(structure.pad.coordinates)
+    shape = narrowed(form, Reach.of(short, structure, short.sample_s))
     told = {p.name: values[index][p.name] for p in shape.parameters if p.name in values[index]}
     fresh = replace(shape, parameters=tuple(p for p in shape.parameters if p.name not in told))
     others = [*_thinned(list(combinations(fresh))), *_thinned(list(combinations(shape)))]

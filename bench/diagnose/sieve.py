@@ -55,7 +55,7 @@ class Sieve:
         self.samples = float(prepared.full.weight.sum())
         full = prepared.full
         rich = structure.in_air or is_rich(full)
-        self.reach = Reach.of(full, prepared.sample_s, prepared.depth_mm, prepared.force_scale_N, rich)
+        self.reach = Reach.of(full, structure, prepared.sample_s, rich)
 
     @property
     def short(self) -> Data:
