@@ -12,12 +12,12 @@ from tests.truth.effects.third_machine import _sliding
 from tests.truth.motion import Path
 
 AIR = {"pad": {"elastic": {"law": "none"}, "relaxation": {"shares": [], "rates": []}, "contact": "unilateral"}}
-RATE_HZ, NOISE_N, WAVES_ALONG = 250.0, 0.008, 5.3
+RATE_HZ, NOISE_N, WAVES_ALONG = 250.0, 0.008, 8.3
 COULOMB_N, COGGING_N = 0.08, 0.12
 
 
 def to_and_fro(seed: int) -> Measurement:
-    """Moves at random over 11 mm, with friction and a ripple that is there five times along the way."""
+    """Moves at random over 11 mm, with friction and a ripple that is there eight times along the way."""
     rng = np.random.default_rng(seed)
     path = Path(0.0, 3000.0).hold(1.0)
     for target in [5.5, -5.5, *rng.uniform(-5.5, 5.5, 14)]:
