@@ -30,9 +30,10 @@ def told_s(case: Case, id: str, **start: float) -> float:
     return late_by_chance_s(prepared, fit)
 
 
-def test_the_scatter_of_a_delay_is_told_beside_a_delay_and_beside_a_lag() -> None:
+@pytest.mark.parametrize("seeds", [SEEDS[:2], pytest.param(SEEDS[2:], marks=pytest.mark.long)])
+def test_the_scatter_of_a_delay_is_told_beside_a_delay_and_beside_a_lag(seeds: tuple[int, ...]) -> None:
     ratios = []
-    for seed in SEEDS:
+    for seed in seeds:
         case = draw_case(seed, ("force_delay",), 1.5, "uneven", protocol="rich", rate_hz=400.0)
         scatter_s = 0.15 * case.truth.parameters["force_delay"]["delay"]
         ratios.append(told_s(case, "force_delay", delay=0.003) / scatter_s)

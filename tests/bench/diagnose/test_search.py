@@ -171,7 +171,8 @@ def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
         assert stage[0].fit.chi2 < stage[2].before and id not in {rival.id for rival in stage[1]}
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 def test_rivals_stand_against_what_the_fit_before_left_in_the_same_units(seed):
     """Once the noise's colour is in the cost, the path's fits have another χ² than those that were compared."""
     c = draw_case(seed, ("viscous_damping",), 2.5, "linear", protocol="rich", rate_hz=300.0, jitter="none",

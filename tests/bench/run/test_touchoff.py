@@ -73,6 +73,7 @@ def test_a_pad_that_pulls_begins_where_it_is_touched(shape):
     assert np.median(np.abs(errors)) < 0.005
 
 
+@pytest.mark.long
 def test_where_a_pull_is_there_at_once_the_surface_is_within_its_range():
     """It is told less well: what is soft at first is like what pulls the same over a gap."""
     errors = []
