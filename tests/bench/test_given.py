@@ -20,6 +20,7 @@ def believing(tmp_path_factory):
     return run(tmp_path_factory.mktemp("believing"), pad="silicone")
 
 
+@pytest.mark.long
 def test_the_run_is_diagnosed_again_against_what_was_believed(believing, monkeypatch):
     asked = []
 

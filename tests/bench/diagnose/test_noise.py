@@ -40,7 +40,7 @@ def test_noise_of_any_kind_is_told_by_the_holds(kind):
     pytest.param("knocks", "table", marks=pytest.mark.long),
     ("rocking_bench", "one_way"),  # swings after each move, at a few Hz
     pytest.param("rocking_bench", "two_ways", marks=pytest.mark.long),
-    ("loose_cable", "two_level"),  # jumps
+    pytest.param("loose_cable", "two_level", marks=pytest.mark.long),  # jumps
     pytest.param("probe_tilt", "reseats", marks=pytest.mark.long),
 ])  # fmt: skip
 def test_what_moves_in_the_holds_and_is_no_noise_is_kept_out_of_the_noise(id, shape):

@@ -196,7 +196,7 @@ def test_an_alarm_of_a_controller(tmp_path):
     [
         (signal.SIGINT, r"^stopped by the operator \(Ctrl-C\)$"),
         (signal.SIGTERM, "^stopped by signal SIGTERM$"),
-        (signal.SIGHUP, "^stopped by signal SIGHUP$"),
+        pytest.param(signal.SIGHUP, "^stopped by signal SIGHUP$", marks=pytest.mark.long),
     ],
 )
 def test_the_operator_stops_it(tmp_path, base, number, words):

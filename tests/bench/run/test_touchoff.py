@@ -40,7 +40,7 @@ def approach(seed: int, pull: Callable[[np.ndarray], np.ndarray] = no_pull) -> t
     return motion.position(time_s)[:end] + surface, force[:end], surface
 
 
-@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 140), marks=pytest.mark.long)])
+@pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 140), marks=pytest.mark.long)])
 def test_error_and_stated_deviation_agree(seeds):
     errors, stated = [], []
     for seed in seeds:
