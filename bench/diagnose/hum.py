@@ -137,9 +137,9 @@ def find(start_s: float, parts: list[Part], stamp_s: Array, force_N: Array) -> L
         at = float(np.mean(force_N))  # what is stated is the mean over the run
         there = 1.0 + growth * (at - float(np.mean(load)))
         shapes.append(replace(shapes[0], amplitude_N=amplitude * there, growth_1_N=growth / there, at_N=at, higher=()))
-    swings = _swinging(line, parts, start_s)
+    swings, bursts = _swinging(line, parts, start_s), _bursting(line, t, e)
     shapes += [] if swings is None else [_with_harmonics(swings, t, e, least, highest, spacing)]
-    shapes += [s for s in [_bursting(line, t, e)] if s is not None]
+    shapes += [] if bursts is None else [bursts]
     shapes += [_dimmed(line, t, e)] if shapes[0].ratio or shapes[0].higher else []
     # the plainest, unless another one takes more than its numbers do by chance
     return min(shapes, key=lambda one: float(np.sum((e - one.force_N(t, load)) ** 2)) + least * _numbers(one))

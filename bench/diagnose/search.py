@@ -190,7 +190,8 @@ class Search(Sieve):
         return None
 
     def _note(self, path: Path, turn: _Turn) -> None:
-        path.rivals.append(self._with_a_long_wave(path.fits[-1], [*turn.ranked, *turn.small]))
+        stood = [*turn.ranked, *turn.small]
+        path.rivals.append(self._with_a_long_wave(path.fits[-1], stood) if turn.found.significant else stood)
         path.tried.append(turn.tried)
         path.measures.append(Measure(path.fits[-1].chi2, self.expected, self.effective, self.prepared.memory))
         path.evidence.append(turn.found)
@@ -199,7 +200,7 @@ class Search(Sieve):
         """The candidates, behind another law an error of the position that repeats over a longer way than is sought,
         where it takes more than one of those: part of one wave is any curve, so that it is no candidate by itself, but
         nor do these data exclude it."""
-        if ranked[0].id != "elastic_law" or not self.reach.rich or now.structure.in_air:
+        if ranked[0].id != "elastic_law" or not self.reach.rich:
             return ranked
         effect = effects.effect("encoder_error")
         depth_mm = self.prepared.depth_mm

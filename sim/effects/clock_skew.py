@@ -30,7 +30,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from sim.effects.base import Array, Effect, Form, Parameter
-from sim.effects.stamps import AT_TIME, origin
+from sim.effects.stamps import AT_TIME, HALF_TIME, half_waves, origin
 
 
 def skewed(values: Mapping[str, float], stamp_s: Array) -> Array:
@@ -66,11 +66,11 @@ def wandering(values: Mapping[str, float], stamp_s: Array) -> Array:
     """When forces stamped `stamp_s` were felt, s."""
     since = stamp_s - origin(stamp_s)
     slow = 0.5 * math.pi / max(values["at_time"], 1e-9)
-    more = sum(values[f"wave_{k}"] * np.sin(k * slow * since) / (k * slow) for k in _WAVES)
+    more = sum(values[f"wave_{k}"] * np.sin(k * slow * since) / (k * slow) for k in range(1, _WAVES + 1))
     return np.asarray(stamp_s - 1e-6 * values["skew"] * (since + more))
 
 
-_WAVES = range(1, 5)
+_WAVES = 4
 _SET_WITHIN = 0.01
 _SET_AT = (0.2, 0.35, 0.5, 0.65, 0.8)
 _SKEW = Parameter(
@@ -84,10 +84,6 @@ _SKEW = Parameter(
     amplitude=True,
     starts=(-300.0, 300.0),
 )
-
-
-def _wave(k: int) -> Parameter:
-    return Parameter(f"wave_{k}", "1", -3.0, 3.0, 0.0, f"{k} half waves of the rate over the data, over `skew`")
 
 
 EFFECT = Effect(
@@ -125,7 +121,7 @@ EFFECT = Effect(
             parameters=(
                 _SKEW,
                 Parameter("free_from", "1", 0.0, 0.9, 0.2, "share of the data while they agree", starts=(0.2, 0.5)),
-                Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the time of which `skew` is the mean", fixed=True),
+                HALF_TIME,
             ),
             time_shift=held,
             sought=False,
@@ -137,7 +133,7 @@ EFFECT = Effect(
                 _SKEW,
                 Parameter("undone", "1", 0.0, 1.0, 0.3, "share of its gain that was undone", starts=(0.3, 0.9)),
                 Parameter("set_at", "1", 0.02, 0.98, 0.5, "share of the data at which it was set", starts=_SET_AT),
-                Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the length of the data", fixed=True),
+                HALF_TIME,
             ),
             time_shift=set_once,
             sought=False,
@@ -147,8 +143,8 @@ EFFECT = Effect(
             what="now faster and now slower apart",
             parameters=(
                 _SKEW,
-                *(_wave(k) for k in _WAVES),
-                Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the time of which `skew` is the mean", fixed=True),
+                *half_waves(_WAVES, 3.0, "of the rate over the data, over `skew`"),
+                HALF_TIME,
             ),
             time_shift=wandering,
             sought=False,

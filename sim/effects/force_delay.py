@@ -18,7 +18,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from sim.effects.base import Array, Effect, Form, Parameter
-from sim.effects.stamps import origin
+from sim.effects.stamps import HALF_TIME, half_waves, origin
 
 
 def late(values: Mapping[str, float], stamp_s: Array) -> Array:
@@ -30,11 +30,11 @@ def wandering(values: Mapping[str, float], stamp_s: Array) -> Array:
     """When forces stamped `stamp_s` were felt, s."""
     since = stamp_s - origin(stamp_s)
     angle = 0.5 * math.pi * since / max(values["at_time"], 1e-9)
-    more = sum(values[f"wave_{k}"] * np.cos(k * angle) for k in WAVES)
+    more = sum(values[f"wave_{k}"] * np.cos(k * angle) for k in range(1, _WAVES + 1))
     return np.asarray(stamp_s - values["delay"] * np.maximum(1.0 + more, 0.0))
 
 
-WAVES = range(1, 7)
+_WAVES = 6
 _DELAY = Parameter(
     "delay",
     "s",
@@ -47,10 +47,6 @@ _DELAY = Parameter(
     floor=("sample_s", 0.05),
     starts=(0.001, 0.004, 0.015),
 )
-
-
-def _wave(k: int) -> Parameter:
-    return Parameter(f"wave_{k}", "1", -0.6, 0.6, 0.0, f"{k} half waves over the data, over `delay`")
 
 
 EFFECT = Effect(
@@ -66,8 +62,8 @@ EFFECT = Effect(
             what="now more and now less, as a network's",
             parameters=(
                 _DELAY,
-                *(_wave(k) for k in WAVES),
-                Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the time of which it is the mean", fixed=True),
+                *half_waves(_WAVES, 0.6, "over the data, over `delay`"),
+                HALF_TIME,
             ),
             time_shift=wandering,
             sought=False,

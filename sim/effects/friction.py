@@ -48,6 +48,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.waves import phase
@@ -234,16 +235,6 @@ def by_speed(dt: float, y: float, state: State, p: State) -> float:
     return level * math.tanh(v / p[4]) + p[3] * v
 
 
-def _tared_out(values: Mapping[str, float]) -> tuple[float, ...]:
-    """What `one_way` reads where all of it is felt on the way in."""
-    return (values["coulomb"], 1.0, values["presliding"])
-
-
-def _tared_in(values: Mapping[str, float]) -> tuple[float, ...]:
-    """What `one_way` reads where all of it is felt on the way out."""
-    return (values["coulomb"], -1.0, values["presliding"])
-
-
 def _term(name: str, what: str) -> Parameter:
     return Parameter(name, "1", -1.0, 1.0, 0.0, f"{what} of the level, over `coulomb`")
 
@@ -288,6 +279,24 @@ _STRIBECK_SPEED = Parameter(
     starts=(0.5, 5.0),
 )
 _VISCOUS = Parameter("viscous", "N*s/mm", 0.0, 1000.0, 0.0, "further force per speed")
+
+
+def _all_one_way(differs: float, values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `one_way` reads where all of it is felt on the way in (1) or on the way out (-1)."""
+    return (values["coulomb"], differs, values["presliding"])
+
+
+def _tared(name: str, differs: float, came: str, felt: str) -> Form:
+    return Form(
+        name=name,
+        what=f"zeroed while it was stuck after a way {came}, so that all of it is felt on the way {felt}",
+        parameters=(_COULOMB, _PRESLIDING),
+        sought=False,
+        blocks={"probe": one_way},
+        pack=partial(_all_one_way, differs),
+        state=(0.0, 0.0, 0.0),
+    )
+
 
 EFFECT = Effect(
     id="friction",
@@ -443,24 +452,8 @@ EFFECT = Effect(
             blocks={"probe": one_way},
             state=(0.0, 0.0, 0.0),
         ),
-        Form(
-            name="tared_out",
-            what="zeroed while it was stuck after a way out, so that all of it is felt on the way in",
-            parameters=(_COULOMB, _PRESLIDING),
-            sought=False,
-            blocks={"probe": one_way},
-            pack=_tared_out,
-            state=(0.0, 0.0, 0.0),
-        ),
-        Form(
-            name="tared_in",
-            what="zeroed while it was stuck after a way in, so that all of it is felt on the way out",
-            parameters=(_COULOMB, _PRESLIDING),
-            sought=False,
-            blocks={"probe": one_way},
-            pack=_tared_in,
-            state=(0.0, 0.0, 0.0),
-        ),
+        _tared("tared_out", 1.0, "out", "in"),
+        _tared("tared_in", -1.0, "in", "out"),
         Form(
             name="by_speed",
             what="by the speed alone, nothing at rest",

@@ -6,6 +6,13 @@ from sim.effects.base import Array, Parameter
 
 AT_TIME = Parameter("at_time", "s", 0.0, 1e6, 30.0, "time since the first sample when it holds", fixed=True)
 
+HALF_TIME = Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the length of the data", fixed=True)
+
+
+def half_waves(count: int, most: float, what: str) -> tuple[Parameter, ...]:
+    """Of what is now more and now less over the data: how far by each of so many half waves, of itself."""
+    return tuple(Parameter(f"wave_{k}", "1", -most, most, 0.0, f"{k} half waves {what}") for k in range(1, count + 1))
+
 
 def origin(stamp_s: Array) -> float:
     """The first of the stamps; a single one without an array around it counts from time 0."""

@@ -26,8 +26,6 @@ from sim.relaxation import Relaxation
 from tests.bench.diagnose.small import measurement
 from tests.truth.cases import Case, draw_case
 
-PLAIN: dict[str, Any] = {"protocol": "staircase", "rate_hz": 150.0, "jitter": "none", "own_clock": False}
-
 
 def begun(c: Case) -> tuple[Search, Fit]:
     """A search, and the believed structure refitted."""
@@ -233,7 +231,8 @@ def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_o
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_a_wave_as_long_as_the_pad_is_deep_stands_beside_another_law(seed):
     """A part of one wave of the encoder is any curve of the depth; which it is these data cannot tell."""
-    c = draw_case(seed, (), noise_kind="white", law="power", **PLAIN)
+    c = draw_case(seed, (), noise_kind="white", law="power", protocol="staircase", rate_hz=150.0, jitter="none",
+                  own_clock=False)  # fmt: skip
     depth_mm = float(np.nanmax(c.position_mm))
     wave = 0.015 * np.sin(2.0 * np.pi * c.position_mm / (0.9 * depth_mm) + 1.5 * seed)
     said = diagnose(measurement(replace(c, position_mm=c.position_mm + wave)), Model.from_dict(c.believed))
