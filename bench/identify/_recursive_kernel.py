@@ -253,12 +253,11 @@ def sweep(
     if accepted and stop == numbers[m, CHECK] and not figures[m, RUNNING] <= figures[m, COST]:
         figures[m, DAMPING] = min(figures[m, DAMPING] * 5.0, 1e9)
     elif stop == numbers[m, END]:
+        # number by number: an assignment of arrays brings in the text of its error, and most of the compilation
         for p in range(P):
-            for q in range(p):
-                matrix[q, p] = matrix[p, q]
-        X[m, 0, :] = x
-        gradients[m, 0, :] = gradient
-        matrices[2 * m, :, :] = matrix
+            X[m, 0, p], gradients[m, 0, p] = x[p], gradient[p]
+            for q in range(P):
+                matrices[2 * m, p, q] = matrix[max(p, q), min(p, q)]
         figures[m, COST], figures[m, COST_WEIGHT] = figures[m, RUNNING], figures[m, RUNNING_WEIGHT]
         figures[m, DAMPING] = max(figures[m, DAMPING] / 5.0, 1e-6)
         numbers[m, CHECK] = numbers[m, END]
