@@ -321,6 +321,7 @@ def test_several_measurements_are_one_pad(padbench, csv, folder):
     assert json.loads(said.out)["samples"] > one["samples"]
 
 
+@pytest.mark.long
 def test_report_makes_a_run_folders_files_again(padbench, folder):
     page = (folder / "report.html").read_text("utf-8")
     (folder / "report.html").unlink()

@@ -37,7 +37,9 @@ def test_a_smoothed_move_is_the_trapezoid_s_after_the_smoothing(smoothing: Smoot
     assert_allclose(late.position(t[t > end_s]), 1.2, atol=3e-5)
 
 
-@pytest.mark.parametrize("smoothing", [PLAIN, *SMOOTHINGS])
+@pytest.mark.parametrize(
+    "smoothing", [PLAIN, SMOOTHINGS[0], *(pytest.param(s, marks=pytest.mark.long) for s in SMOOTHINGS[1:])]
+)
 def test_derivatives_are_those_of_the_way(smoothing: Smoothing) -> None:
     tau, way = np.linspace(-0.06, 0.06, 241), np.array(0.9)
     _, by_middle, by_speed = profile(tau, way, np.array(24.0), 2500.0, smoothing)

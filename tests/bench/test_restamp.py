@@ -93,6 +93,7 @@ def test_two_clocks_are_left_alone() -> None:
     assert restamped(apart) is apart
 
 
+@pytest.mark.long
 def test_moves_between_noisy_rests_are_found() -> None:
     """Wiggles of a smoothed rest beside a move do not hide that it begins and ends there."""
     missed = moves = 0

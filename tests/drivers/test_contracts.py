@@ -161,7 +161,7 @@ def test_load_cell_over_a_simulated_port(name: str) -> None:
         cell.link.close()
 
 
-@pytest.mark.parametrize("name", ["orca", "iai", pytest.param("smc_lec", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", ["orca", *(pytest.param(n, marks=pytest.mark.long) for n in ("iai", "smc_lec"))])
 def test_motor_over_a_pseudo_terminal(name: str) -> None:
     on_the_wall(
         lambda: emulated(name, "dad141"),
@@ -170,7 +170,9 @@ def test_motor_over_a_pseudo_terminal(name: str) -> None:
     )
 
 
-@pytest.mark.parametrize("name", ["dad141", "dad141_modbus", "laumas_tlb", "mt_sics"])
+@pytest.mark.parametrize(
+    "name", ["dad141", "mt_sics", *(pytest.param(n, marks=pytest.mark.long) for n in ("dad141_modbus", "laumas_tlb"))]
+)
 def test_load_cell_over_a_pseudo_terminal_or_socket(name: str) -> None:
     on_the_wall(
         lambda: emulated("orca", name),

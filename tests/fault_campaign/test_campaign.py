@@ -38,6 +38,7 @@ def test_a_seed_stands_for_the_same_always_and_for_another_thing_than_the_next()
     assert len({draw(seed).text() for seed in range(50)}) == 50
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(6))
 def test_without_faults_none_of_these_runs_stops(tmp_path, seed):
     """Watchdogs that bark at nothing would hide in a campaign of faults."""

@@ -19,7 +19,7 @@ def test_it_is_noticed(tmp_path, bench):
 
 
 @pytest.mark.parametrize("bench", ["simulated", "simulated_laumas", "simulated_balance", "simulated_iai"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2))])
 def test_and_the_ramp_alone_is_no_jump(tmp_path, bench, seed):
     seen = press(tmp_path, bench_with([], bench, seed=seed), SLOWLY)
     assert seen.how == "recovered", seen.cause

@@ -168,7 +168,7 @@ class TestStreamingIsTheArrayForm:
         compare_forms(stiff, unilateral)
 
 
-@pytest.mark.parametrize("unilateral", [True, False])
+@pytest.mark.parametrize("unilateral", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_all_pairs_of_forms_give_forces(unilateral: bool) -> None:
     t, x = walk(150)
     pad = Pad(Exponential(2.24, 0.69), GEL, unilateral)

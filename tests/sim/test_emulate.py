@@ -112,6 +112,7 @@ def gone(path: str, opened: int) -> bool:
     return hung_up and not Path(path).exists()
 
 
+@pytest.mark.long
 def test_a_port_that_is_pulled_out_and_plugged_in_again() -> None:
     """What a client meets with an adapter whose cable is pulled; the other device's terminal knows nothing of it."""
     fault = {"kind": "unplugged", "device": "motor", "at_s": 4.0, "duration_s": 2.0}

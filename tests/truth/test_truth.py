@@ -113,7 +113,7 @@ def test_contact_against_crude_steps_and_their_halving(contact):
     assert np.max(np.abs(second - exact)) < 0.6 * np.max(np.abs(first - exact))
 
 
-@pytest.mark.parametrize("contact", ["bonded", "unilateral"])
+@pytest.mark.parametrize("contact", [pytest.param("bonded", marks=pytest.mark.long), "unilateral"])
 @pytest.mark.parametrize("law", [Exponential(2.24, 0.69), Power(2.0, 0.4), Hertz(0.1, 5.0), Tanh(4.0, 1.0, 0.5)])
 def test_step_size_does_not_matter(contact, law):
     motion = random_steps(np.random.default_rng(3), 2.5, steps=12)

@@ -51,7 +51,7 @@ def test_each_shape_changes_the_recording_at_any_size(id, shape):
         assert case.believed["pad"]["contact"] == "bonded" and case.truth.pad.contact == "unilateral"
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", [pytest.param(s, marks=[pytest.mark.long] if s % 3 else []) for s in range(10)])
 def test_cases_stay_in_their_ranges(seed):
     case = draw_case(seed, ("friction",))
     truth = case.truth

@@ -12,6 +12,8 @@ from .motion import Path
 from .sets import shapes_of
 from .test_truth_effects import SHORT, hidden
 
+pytestmark = pytest.mark.long
+
 OTHERS = ("friction", "adhesion", "viscous_damping", "stress_softening", "damage")
 FRAMES = ("printed", "clamp_loosens")
 

@@ -9,6 +9,8 @@ from .effects.registry import SATURATION, Samples
 from .test_truth_effects import hidden
 from .test_truth_fourth_signal import MANY
 
+pytestmark = pytest.mark.long
+
 
 def runs(flag):
     """(beginnings, lengths) of the runs of True."""

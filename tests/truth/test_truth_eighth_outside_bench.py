@@ -12,6 +12,8 @@ from .test_truth_effects import hidden
 from .test_truth_sixth_outside import touches
 from .test_truth_third_outside import added
 
+pytestmark = pytest.mark.long
+
 MINE = ("neighbour", "interleaving", "slew_limit", "stuck_bit", "battery", "short_leg")
 
 

@@ -9,6 +9,8 @@ from .sets import SETS, shapes_of
 from .test_truth_cases import CATALOGUE
 from .test_truth_effects import hidden
 
+pytestmark = pytest.mark.long
+
 MINE = ("echo", "delayed_yield", "pressed_beside", "twitches", "voids")
 
 

@@ -10,6 +10,8 @@ from .test_truth_effects import SHORT, disturbed, hidden
 from .test_truth_fourth_signal import QUIET
 from .test_truth_seventh_signal import swung
 
+pytestmark = pytest.mark.long
+
 # --- resonance --------------------------------------------------------------------------------------------------------
 
 

@@ -11,6 +11,8 @@ from .motion import Path
 from .sets import shapes_of
 from .test_truth_effects import SHORT, hidden
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("shape", shapes_of("frame_compliance", "fifth"))

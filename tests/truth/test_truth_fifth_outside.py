@@ -12,6 +12,8 @@ from .test_truth_effects import hidden
 from .test_truth_fourth_outside import SIX
 from .test_truth_third_outside import added
 
+pytestmark = pytest.mark.long
+
 HELD = Path(1.0).hold(60.0).motion()  # a spring of 3 N/mm, held at 1 mm of 2
 
 

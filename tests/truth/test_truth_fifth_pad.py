@@ -11,6 +11,8 @@ from .pad import Pad
 from .sets import shapes_of
 from .test_truth_effects import cycles, hidden
 
+pytestmark = pytest.mark.long
+
 
 def test_a_tape_that_holds_less_each_time():
     pad = Pad(Power(3.0, 0.0), (0.5,), (3.0,))

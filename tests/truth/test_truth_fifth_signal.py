@@ -12,6 +12,8 @@ from .sets import shapes_of
 from .test_truth_effects import SHORT, disturbed, hidden
 from .test_truth_fourth_signal import MANY, QUIET, gain
 
+pytestmark = pytest.mark.long
+
 
 def test_a_damper_of_oil():
     omega, damping, drag = 2 * np.pi * 40.0, 0.03, 0.6

@@ -10,6 +10,8 @@ from .motion import Path
 from .sets import shapes_of
 from .test_truth_effects import SHORT, hidden, numbers
 
+pytestmark = pytest.mark.long
+
 
 def test_a_frame_that_creeps():
     # A spring K behind a frame: K w/τ' with 1/τ' = (1 + K C s/(1 + K C (1 − s)))/τ, K = 3 N/mm.

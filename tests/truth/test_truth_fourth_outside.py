@@ -9,6 +9,8 @@ from .motion import Path
 from .test_truth_effects import hidden
 from .test_truth_third_outside import added
 
+pytestmark = pytest.mark.long
+
 TOUCHES = Path(-0.5)
 for _ in range(6):
     TOUCHES.to(1.6, 40.0).hold(0.6).to(-0.5, 40.0).hold(0.6)

@@ -10,6 +10,8 @@ from .pad import Pad
 from .sets import shapes_of
 from .test_truth_effects import cycles, hidden, numbers
 
+pytestmark = pytest.mark.long
+
 
 def test_a_film_bears_an_impulse():
     # c_1 = ½: quickly back by d after a long hold at 2 mm the force is 3 (1 − d) N, and then pulls.

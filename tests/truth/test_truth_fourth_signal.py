@@ -9,6 +9,8 @@ from .motion import Path, rich
 from .sets import shapes_of
 from .test_truth_effects import SHORT, disturbed, hidden
 
+pytestmark = pytest.mark.long
+
 QUIET = {"noise_N": 1e-6, "jitter": "none", "own_clock": False, "rate_hz": 1000.0, "motion": SHORT, "law": "power"}
 MANY = {"motion": rich(2.0, (60.0, 8.0)), "rate_hz": 1000.0, "noise_kind": "white", "jitter": "none"}
 

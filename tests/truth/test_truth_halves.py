@@ -84,6 +84,7 @@ def test_each_shape_changes_the_recording_at_any_size(id, shape):
 # --- outside the catalogue --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("id", "shape"), of_every_day(BEYOND))
 def test_what_is_outside_is_seen_at_its_typical_size(id, shape):
     told = {"law": "power", "contact": "unilateral", "noise_N": 0.01, **PLAIN}

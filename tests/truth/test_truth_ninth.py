@@ -13,6 +13,8 @@ from .motion import Path
 from .sets import shapes_of
 from .test_truth_effects import hidden
 
+pytestmark = pytest.mark.long
+
 OTHERS = ("friction", "adhesion", "viscous_damping", "stress_softening", "damage")
 FRAMES = ("disc_spring", "gas_strut")
 

@@ -11,6 +11,8 @@ from .test_truth_effects import hidden
 from .test_truth_eighth_channel import runs
 from .test_truth_fourth_signal import MANY
 
+pytestmark = pytest.mark.long
+
 
 def test_they_are_of_the_ninth():
     assert "folds_back" in shapes_of("saturation", "ninth")

@@ -10,6 +10,8 @@ from .test_truth_cases import CATALOGUE
 from .test_truth_effects import hidden
 from .test_truth_third_outside import added
 
+pytestmark = pytest.mark.long
+
 MINE = ("idle_tones", "lossy_codec", "delta_code", "concealment", "railway")
 
 

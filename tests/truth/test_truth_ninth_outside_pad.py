@@ -19,6 +19,8 @@ from .sets import SETS, shapes_of
 from .test_truth_cases import CATALOGUE
 from .test_truth_effects import hidden
 
+pytestmark = pytest.mark.long
+
 MINE = ("firing", "imprint", "catch_bonds", "regulated", "fabric")
 
 

@@ -23,6 +23,8 @@ from .pad import Pad, simulate
 from .sets import shapes_of
 from .test_truth_effects import cycles, hidden
 
+pytestmark = pytest.mark.long
+
 SOFT = Pad(Power(3.0, 0.0), (0.5,), (0.3,))
 
 

@@ -11,6 +11,8 @@ from .test_truth_eighth_signal import applied
 from .test_truth_fourth_signal import QUIET
 from .test_truth_seventh_signal import swung
 
+pytestmark = pytest.mark.long
+
 LONG = Path(-0.5).to(1.0, 0.5).hold(50.0).to(-0.5, 0.5).hold(10.0).motion()
 
 # --- resonance --------------------------------------------------------------------------------------------------------

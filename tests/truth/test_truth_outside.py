@@ -22,6 +22,7 @@ def test_there_are_enough_of_them():
     assert len(OUTSIDE) >= 10
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("id", "shape"), SHAPES)
 def test_each_is_seen_at_its_typical_size(id, shape):
     case = draw_case(31, (id,), 1.0, shape, law="power", contact="unilateral", noise_N=0.01, **PLAIN)

@@ -10,6 +10,8 @@ from .motion import Path
 from .sets import shapes_of
 from .test_truth_effects import SHORT, hidden
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_rod_that_is_bowed(seed):

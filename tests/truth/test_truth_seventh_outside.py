@@ -11,6 +11,8 @@ from .test_truth_effects import hidden
 from .test_truth_sixth_outside import touches
 from .test_truth_third_outside import added
 
+pytestmark = pytest.mark.long
+
 
 def test_they_are_of_the_bench_or_of_the_pad():
     mine = outside(CATALOGUE, "seventh")

@@ -12,6 +12,8 @@ from .sets import shapes_of
 from .test_truth_effects import SHORT, disturbed, hidden
 from .test_truth_fourth_signal import MANY, QUIET
 
+pytestmark = pytest.mark.long
+
 
 def swung(build, frequency_Hz):
     """What the first stage of the sensor makes of a sine of amplitude 1, as a complex number."""

@@ -10,6 +10,8 @@ from .motion import Path
 from .sets import shapes_of
 from .test_truth_effects import SHORT, hidden
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_screw_that_is_held_at_one_end(seed):

@@ -12,6 +12,8 @@ from .test_truth_cases import CATALOGUE
 from .test_truth_effects import SPRING, hidden
 from .test_truth_third_outside import added
 
+pytestmark = pytest.mark.long
+
 
 def touches(count, depth=1.8, hold_s=0.05, air_s=0.05, speed=20.0):
     path = Path(-0.5)

@@ -11,6 +11,8 @@ from .sets import shapes_of
 from .test_truth_effects import SHORT, disturbed, hidden
 from .test_truth_fourth_signal import MANY, QUIET
 
+pytestmark = pytest.mark.long
+
 
 def test_a_joint_whose_damping_is_dry():
     t, omega = 1e-4 * np.arange(5000), 2 * np.pi * 40.0

@@ -10,6 +10,8 @@ from .motion import Path, rich
 from .sets import shapes_of
 from .test_truth_effects import SHORT, disturbed, hidden, numbers
 
+pytestmark = pytest.mark.long
+
 QUIET = {"noise_N": 1e-6, "jitter": "none", "own_clock": False, "rate_hz": 1000.0, "motion": SHORT, "law": "power"}
 
 

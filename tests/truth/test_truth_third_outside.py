@@ -11,6 +11,8 @@ from .pad import Pad
 from .sets import shapes_of
 from .test_truth_effects import SPRING, hidden
 
+pytestmark = pytest.mark.long
+
 
 def added(build, t):
     samples = Samples(t, np.zeros_like(t), np.zeros_like(t), 0.01)

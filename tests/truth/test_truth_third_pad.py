@@ -11,6 +11,8 @@ from .pad import Pad
 from .sets import shapes_of
 from .test_truth_effects import cycles, hidden
 
+pytestmark = pytest.mark.long
+
 
 def test_adhesion():
     motion = Path(-0.5).to(1.0, 2.0).hold(0.1).to(-0.5, 2.0).motion()

@@ -162,6 +162,7 @@ def test_a_run_that_was_measured_and_not_analysed_is_analysed_when_the_series_go
     assert go(path, made)[0] and fitted == []
 
 
+@pytest.mark.long
 def test_two_series_on_one_list_do_not_measure_together(padbench, tmp_path, monkeypatch):
     """The second begins while the first measures its first pad."""
     path, begun, inside = list_file(tmp_path, samples=PADS[:1]), work.run_protocol, []

@@ -295,11 +295,10 @@ def test_a_line_that_grows_with_the_load_is_stated_at_the_mean_force():
 @pytest.mark.parametrize(
     "shape",
     [
-        "odd harmonics",
         "wanders with its harmonics",
         *(
             pytest.param(s, marks=pytest.mark.long)
-            for s in ("sine", "one way", "swells", "wanders", "let through late")
+            for s in ("sine", "odd harmonics", "one way", "swells", "wanders", "let through late")
         ),
     ],
 )

@@ -43,6 +43,7 @@ def means(errors_mm: Array, inside: NDArray[np.bool_]) -> Array:
     return np.asarray(picked[..., :whole].reshape(*picked.shape[:-1], -1, 10).mean(axis=-1))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("step_mm", [pytest.param(0.0, marks=pytest.mark.long), STEP_MM])
 def test_errors_are_drawn_as_large_as_they_are(step_mm: float) -> None:
     """Where a servo settles a window bends what it smooths, and neighbours are off together."""

@@ -25,8 +25,8 @@ pytestmark = pytest.mark.slow
 
 GROUPS = {
     "machine": ("frame_compliance", "backlash", "contact_offset", "friction", "inertia", "cogging", "encoder_error"),
-    "force path": ("resonance", "sensor_lag", "force_delay", "clock_skew", "mains_hum"),
-    "channel": ("force_bias", "force_drift", "saturation", "outliers", "stuck_samples"),
+    "force path": ("sensor_lag", "resonance", "force_delay", "clock_skew", "mains_hum"),
+    "channel": ("force_drift", "force_bias", "saturation", "outliers", "stuck_samples"),
     "contact": ("separation", "adhesion", "elastic_law", "permanent_set"),
     "material": (
         *("stress_softening", "damage", "missing_relaxation_mode"),

@@ -17,6 +17,7 @@ from tests.bench.diagnose.small import measurement
 from tests.truth.cases import draw_case
 
 
+@pytest.mark.long
 def test_a_block_with_the_greatest_forces_is_not_predicted_by_a_limit_that_the_others_make_up(monkeypatch):
     worse = []
     for seed in range(4):

@@ -84,6 +84,7 @@ def felt(effects: list[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray, np.ndar
     return p.full.position_mm[p.at], told.total_N[p.at], p.full.sigma_N[p.at]
 
 
+@pytest.mark.long
 def test_errors_of_the_position_are_felt_by_what_feels_more_than_the_pad():
     _, through_the_pad, _ = felt([])
     assert not through_the_pad.any(), "the pad's stiffness is in the noise already"

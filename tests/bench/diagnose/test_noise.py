@@ -36,7 +36,7 @@ def test_noise_of_any_kind_is_told_by_the_holds(kind):
 
 
 @pytest.mark.parametrize(("id", "shape"), [
-    ("knocks", "thump"),  # in some holds, for a while
+    pytest.param("knocks", "thump", marks=pytest.mark.long),  # in some holds, for a while
     pytest.param("knocks", "table", marks=pytest.mark.long),
     ("rocking_bench", "one_way"),  # swings after each move, at a few Hz
     pytest.param("rocking_bench", "two_ways", marks=pytest.mark.long),

@@ -78,6 +78,7 @@ def test_where_a_model_runs_away_its_error_has_no_end_and_no_step_is_taken_there
     assert np.array_equal(refit(data, Structure(pad), pad.x(), 5).x, pad.x())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3))])
 def test_two_shapes_of_one_cause_are_united_where_a_form_has_both(seed):
     """A mass of which a part rings on its adapter: found as one that rings, with a rigid one beside it."""

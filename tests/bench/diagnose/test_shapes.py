@@ -49,11 +49,11 @@ def stated(fit: Fit, name: str) -> tuple[float, float]:
 @pytest.mark.parametrize(
     ("id", "shape", "form", "name", "better"),
     [
-        ("viscous_damping", "thinning", "linear", "coefficient", "power"),
+        pytest.param("viscous_damping", "thinning", "linear", "coefficient", "power", marks=pytest.mark.long),
         ("viscous_damping", "one_sided", "linear", "coefficient", "one_sided"),
         pytest.param("depth_dependent_relaxation", "knee", "linear", "slope", "knee", marks=pytest.mark.long),
         ("cogging", "iron", "sine", "period", "trailing"),
-        ("inertia", "cable_chain", "rigid", "mass", "growing"),
+        pytest.param("inertia", "cable_chain", "rigid", "mass", "growing", marks=pytest.mark.long),
         ("friction", "tared", "coulomb", "coulomb", "tared_out"),
         pytest.param("clock_skew", "resynchronised", "linear", "skew", "set_once", marks=pytest.mark.long),
         pytest.param("damage", "hyperbolic", "linear", "rate", "hyperbolic", marks=pytest.mark.long),

@@ -58,6 +58,7 @@ def test_force_on_its_own_stamps() -> None:
     assert result.samples == len(force_time)
 
 
+@pytest.mark.long
 def test_units_do_not_matter() -> None:
     pad = Pad(Exponential(2.24, 0.69), (0.25, 0.15), (4.0, 0.35))
     data = measured(pad, noise_N=0.02)

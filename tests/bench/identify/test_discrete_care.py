@@ -48,6 +48,7 @@ def test_doubtful_spans_are_history_and_cost_nothing():
 # --- a surface in doubt ---
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["noniterative", "iterative", "iv", "fast"])
 def test_the_surface_s_doubt_is_in_the_standard_errors(method):
     m, doubt_mm = of_path(Path(-0.5).hold(0.5).to(2.4, 80).hold(8).to(1.2, 80).hold(4)), 0.02
@@ -64,6 +65,7 @@ def test_the_surface_s_doubt_is_in_the_standard_errors(method):
         assert np.sqrt(doubted[name].std ** 2 - certain[name].std ** 2) == pytest.approx(moves, rel=0.15, abs=2e-4)
 
 
+@pytest.mark.long
 def test_intervals_hold_over_surfaces_that_are_off():
     inside = []
     for seed in range(8):

@@ -167,6 +167,7 @@ def errors(method: str, samples: int, seeds: range) -> np.ndarray:
     return np.array(out)
 
 
+@pytest.mark.long
 def test_the_bias_of_arx_stays_and_that_of_iv_goes():
     short, long = (errors("iv", n, range(4)) for n in (600, 2400))
     arx = errors("iterative", 2400, range(4))

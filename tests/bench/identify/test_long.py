@@ -123,6 +123,7 @@ print(held() - before)
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the peak is read from /proc")
 def test_memory_does_not_grow_with_the_data() -> None:
     peak = {}

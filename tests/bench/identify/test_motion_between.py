@@ -106,6 +106,7 @@ def test_clean_data_on_straight_lines_keep_them() -> None:
     assert result.parameters["b"].value == pytest.approx(0.69, rel=0.03)
 
 
+@pytest.mark.long
 def test_of_the_two_paths_the_one_with_the_lower_cost_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """By however little: else V would be above that of the true numbers where the two are close."""
     data, options = [], []

@@ -46,6 +46,7 @@ def cut(seed: int) -> tuple[FitResult, DrawnPad]:
     return fit(data, law=pad.law.name, order=len(pad.rates), contact=pad.contact, degree=degree), drawn
 
 
+@pytest.mark.long
 def test_parameters_are_unbiased_and_honest() -> None:
     z = []
     for seed in range(12):

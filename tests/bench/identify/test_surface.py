@@ -31,7 +31,9 @@ def misplaced(pad: Pad, seed: int) -> tuple[Measurement, float]:
     return data, off
 
 
-@pytest.mark.parametrize("pad", [EXPONENTIAL, POWER], ids=["exponential", "power"])
+@pytest.mark.parametrize(
+    "pad", [EXPONENTIAL, pytest.param(POWER, marks=pytest.mark.long)], ids=["exponential", "power"]
+)
 def test_parameters_are_honest_though_the_surface_is_off(pad: Pad) -> None:
     law, truth = pad.law.name, pad.parameters()
     z, found, off = [], [], []
@@ -46,7 +48,7 @@ def test_parameters_are_honest_though_the_surface_is_off(pad: Pad) -> None:
     assert np.std(np.subtract(found, off)) < 0.3 * DOUBT_MM
 
 
-@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 12), marks=pytest.mark.long)])
+@pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 12), marks=pytest.mark.long)])
 def test_a_misplaced_surface_is_not_taken_for_another_law(seeds: range) -> None:
     chosen = [(r.law, r.order) for r in (fit(misplaced(EXPONENTIAL, seed)[0]) for seed in seeds)]
     assert chosen.count(("exponential", 2)) >= 5 * len(seeds) / 6

@@ -139,6 +139,7 @@ def recovered(path: Path, recording: Recording | None) -> None:
     assert recover(out, path.with_name("twice.mcap"))[1].gone is False
 
 
+@pytest.mark.long
 def test_cut_at_every_byte(small, tmp_path):
     """Every length up to the end of the data, every tenth of the index behind; `recover` at every hundredth."""
     path = tmp_path / "cut.mcap"

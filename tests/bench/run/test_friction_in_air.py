@@ -16,7 +16,14 @@ def with_friction(tmp_path, base: str, coulomb: float, **simulation) -> Done:
     return run(tmp_path, base=base, simulation={"pad": str(file)} | simulation)
 
 
-@pytest.mark.parametrize("base", ["simulated", "simulated_iai", "simulated_smc_lec", "simulated_balance"])
+@pytest.mark.parametrize(
+    "base",
+    [
+        "simulated",
+        "simulated_iai",
+        *(pytest.param(b, marks=pytest.mark.long) for b in ("simulated_smc_lec", "simulated_balance")),
+    ],
+)
 @pytest.mark.parametrize("coulomb", [pytest.param(0.08, marks=pytest.mark.long), 0.3])
 def test_the_surface_is_found_behind_friction(tmp_path, base, coulomb):
     done = with_friction(tmp_path, base, coulomb)

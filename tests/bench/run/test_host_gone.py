@@ -216,6 +216,7 @@ def test_killed_while_it_presses_the_motor_lets_go_by_itself(tmp_path):
         assert abs(now.force_N) < 0.2 * PRESSED_N
 
 
+@pytest.mark.long
 def test_killed_on_its_way_a_motor_without_watchdog_stands_after_a_short_segment(tmp_path):
     """An IAI controller finishes what it was told, which is never more than a fifth of a second of a move."""
     speed = 2.0
@@ -272,6 +273,7 @@ def test_the_safe_state_hold_of_a_controller_after_sigterm(tmp_path):
     assert stands == pytest.approx(SURFACE_MM - 0.3, abs=0.1)
 
 
+@pytest.mark.long
 def test_three_signals_do_not_tear_the_recording(tmp_path):
     """Whoever is frightened strikes on until the prompt is back."""
     with emulated(tmp_path, "simulated") as (emulator, real), running(tmp_path, real, PRESS, "steps[0]") as process:

@@ -213,6 +213,7 @@ def bench_on_terminals(folder: Path) -> Iterator[Path]:
         emulator.stderr.close()
 
 
+@pytest.mark.long
 @POSIX
 def test_a_run_over_terminals_that_is_stopped_and_one_that_is_killed(tmp_path):
     protocol = protocol_file(tmp_path, LONG)
