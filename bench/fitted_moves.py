@@ -26,6 +26,7 @@ AGREED = 5.0  # standard deviations of χ² within which a move is a profile
 MOSTLY = 0.8  # of the moves that tell: where so many are trapezoids nothing smooths them
 TELLING, SHOWING = 6, 48  # samples of a move that tell how it begins and ends, at the least; and as many as it takes
 APART = 10  # samples of rest between two moves, one of which would else be in the other
+BEGUN = 1.02  # times the speed that is seen, where a search begins
 FASTEST = 12  # moves: slow ones hardly show how they begin
 SMOOTHED_S = (0.3e-3, 0.7e-3, 1.5e-3, 3e-3, 6e-3, 12e-3)  # standard deviations of smoothing that are tried first
 FASTER, STARTED = (1.0, 1.5, 3.0), 2  # times the acceleration of plain trapezoids; the best of these that are begun at
@@ -35,7 +36,8 @@ SOME = 0.15  # of the moves, that it must explain
 
 @dataclass
 class _Sampled:
-    """Moves from rest to rest, padded to one width: `time_s`, `gone` (way since the start, ≥ 0), `used`: (m, w)."""
+    """Moves from rest to rest, padded to one width: `time_s`, `gone` (way since the start, ≥ 0), `used`: (m, w);
+    `duration` (m,): the longest that its cruise can take."""
 
     time_s: Array
     gone: Array
@@ -102,7 +104,10 @@ def _asked(
     rest, starts, ends = [g for g, goes in zip(rest, on, strict=True) if goes], starts[on], ends[on]
     noise = noise[on] if isinstance(noise, np.ndarray) else noise
     moves = _sampled(t, x, rest, starts, ends, x if fitted is None else fitted, most)
-    asked = _Asked(rest, starts, ends, moves, np.maximum(4 * noise, SLACK * moves.way))
+    allowed = np.maximum(4 * noise, SLACK * moves.way)
+    # what a move begins and ends with may hide in the noise of the rests, so that it took longer than it is seen to
+    moves.duration /= np.maximum(1.0 - 2.0 * allowed / moves.way, 0.5)
+    asked = _Asked(rest, starts, ends, moves, allowed)
     return asked if asked.told.any() else None
 
 
@@ -147,6 +152,9 @@ def fitted_moves(
             np.where(lone, new, old) for new, old in zip(alone, (middle, speed, squares), strict=True)
         )
     good = np.sqrt(squares / np.maximum(moves.count, 1)) <= allowed
+    if fitted is not None:
+        for k in np.flatnonzero(good & (moves.count == most)).tolist():
+            middle[k], speed[k] = _of_all(t, x, fitted, asked, k, middle[k], speed[k], acceleration, smoothing)
     more = moves.count >= 3
     if more.any() and np.mean(good[more]) < 0.5:
         return {}  # no trapezoids: those with too few samples to tell are none either
@@ -282,7 +290,7 @@ def _fitted(
     """Middle, speed and Σ error² of each move, by damped Gauss-Newton steps on all moves at once, (m,) each."""
     fastest = np.sqrt(acceleration * moves.way)
     slowest = moves.way / moves.duration
-    middle, speed = moves.middle.copy(), np.clip(1.02 * moves.speed, np.minimum(slowest, fastest), fastest)
+    middle, speed = moves.middle.copy(), np.clip(BEGUN * moves.speed, np.minimum(slowest, fastest), fastest)
     kept = np.zeros(len(middle), dtype=bool) if speed_kept is None else speed_kept
     damping = np.full(len(middle), 1e-3)
 
@@ -317,6 +325,19 @@ def _fitted(
         if not better.any():
             break
     return middle, speed, squares
+
+
+def _of_all(
+    t: Array, x: Array, fitted: Array, asked: _Asked, k: int, middle: float, speed: float, acceleration: float,
+    smoothing: Smoothing,
+) -> tuple[float, float]:  # fmt: skip
+    """Middle and speed of one move by all its samples, from those that a few of them tell."""
+    here = slice(k, k + 1)
+    whole = _sampled(t, x, asked.groups[here], asked.starts[here], asked.ends[here], fitted, len(t))
+    whole.duration = asked.moves.duration[here]
+    whole.middle, whole.speed = np.array([middle]), np.array([speed / BEGUN])
+    middles, speeds, _ = _fitted(whole, acceleration, smoothing)
+    return float(middles[0]), float(speeds[0])
 
 
 def _golden(f: Callable[[float], float], low: float, high: float) -> float:

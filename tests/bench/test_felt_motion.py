@@ -78,6 +78,29 @@ def test_a_slow_move_is_one_whatever_its_noise(seed: int) -> None:
     assert np.abs(speed - 0.6).max() < 2e-3
 
 
+def test_a_slow_move_is_met_as_well_as_all_its_samples_tell() -> None:
+    """Noise hides how it begins and ends: so it is seen to be shorter than it is, and is not faster for that."""
+    t = np.arange(0.0, 20.0, STEP_S)
+    fine = np.arange(0.0, 20.0, 1e-4)
+    late = np.exp(-np.arange(0.0, 0.02, 1e-4) / 2.4e-3)  # a servo behind its command
+    off, lines = [], []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        speed = rng.uniform(0.3, 0.6)
+        x = trapezoid(fine, 1.0, 2.5, speed, 3000.0) - trapezoid(fine, 11.0, 2.5, speed, 3000.0)
+        noisy = np.interp(t, fine, np.convolve(x, late / late.sum())[: len(x)])
+        noisy += 0.5 * NOISE_MM * rng.standard_normal(t.size)
+        told = felt(t, noisy)
+        assert len(told.planned) == 2
+        for begins, ends, move in told.planned:
+            inside = (t >= begins) & (t <= ends)
+            left = (noisy - move.position(t))[inside] / (0.5 * NOISE_MM)
+            line = np.linspace(-1.0, 1.0, len(left))
+            off.append(left.sum() / np.sqrt(len(left)))
+            lines.append(left @ line / np.sqrt(line @ line))
+    assert np.abs(off).max() < 3.0 and np.abs(lines).max() < 3.0
+
+
 def test_two_moves_with_a_short_rest_between_stay_two() -> None:
     t = np.arange(0.0, 40.0, STEP_S)
     x = sum(trapezoid(t, 6.0 + 6 * k + late, 0.4, 20.0, 1000.0) for k in range(5) for late in (0.0, 0.08))
