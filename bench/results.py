@@ -14,7 +14,6 @@ import numpy as np
 from bench import identify
 from bench.diagnose import diagnose
 from bench.diagnose.next_test import design
-from bench.diagnose.words import force
 from bench.diagnose.words import lines as diagnosis_lines
 from bench.errors import InputError, PadbenchError
 from bench.fitview import fit_view
@@ -25,6 +24,7 @@ from bench.recording.schemas import NO_SURFACE
 from bench.report import Plan as PlannedCurve
 from bench.report import write_report
 from bench.run.folder import FIT, MODEL, REPORT
+from sim.effects.reading import force
 from sim.model import Model
 
 if TYPE_CHECKING:

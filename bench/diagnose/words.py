@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from sim.effects import all_effects
+from sim.effects.reading import force
 
 from .result import Alternative, CauseFound, Diagnosis
 from .way import LEVELS, TOLD_ONCE
@@ -62,11 +63,6 @@ def named(d: Diagnosis) -> str:
 def in_air(d: Diagnosis) -> bool:
     """Whether the bench was looked at in free air, without a pad."""
     return bool(d.model_dict.get("pad", {}).get("elastic", {}).get("law") == "none")
-
-
-def force(value_N: float, digits: int = 3) -> str:
-    """A force for reading: mN where it is small."""
-    return f"{1e3 * value_N:.{digits}g} mN" if abs(value_N) < 0.5 else f"{value_N:.{digits}g} N"
 
 
 def percent(share: float) -> str:

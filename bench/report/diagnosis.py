@@ -14,6 +14,7 @@ from bench.report import diagnosis_plots as plots
 from bench.report import markup
 from bench.report.diagnosis_views import best_view
 from bench.report.markup import figure, folded, measured, section, table
+from sim.effects.reading import force
 
 __all__ = ["card", "sections", "write_diagnosis"]
 
@@ -64,10 +65,10 @@ def card(d: Diagnosis, heading: str = "", *, notes: bool = True, remark: str = "
         said.append("No cause of the catalogue does this: look at what remains before trusting the model.")
     paragraphs = "".join(f"<p>{markup.text(sentence)}</p>" for sentence in said if sentence)
     before = "error on held-out data, before" if d.causes else "error on held-out data"
-    tiles = [(before, words.force(d.held_out_before))]
+    tiles = [(before, force(d.held_out_before))]
     if d.causes:
-        tiles.append(("after", words.force(d.held_out_after)))
-    tiles.append(("noise floor", words.force(d.noise_floor)))
+        tiles.append(("after", force(d.held_out_after)))
+    tiles.append(("noise floor", force(d.noise_floor)))
     if d.causes:
         tiles.append(("of the error explained", words.percent(max(1.0 - d.left, 0.0))))
     if d.flagged_fraction > 0:

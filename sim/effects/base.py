@@ -35,6 +35,8 @@ from numpy.typing import NDArray
 from sim.jit import Block
 from sim.kernel import PLACES
 
+from .reading import read
+
 if TYPE_CHECKING:
     from sim.pad import Pad
 
@@ -122,7 +124,8 @@ class Effect:
     what: str
     forms: tuple[Form, ...]
     says: str = ""
-    """A sentence for whoever runs the bench, with the parameters of the first form as `{name}` fields."""
+    """A sentence for whoever runs the bench, with the parameters of the first form as `{name}` fields (see
+    `sim.effects.reading` for how their numbers can be written)."""
     check: str = ""
     """What to look at on the bench."""
     reference: str = ""
@@ -133,7 +136,7 @@ class Effect:
 
     def explanation(self, values: Mapping[str, float]) -> str:
         """`says` with numbers in it; `what` where the effect has no such sentence."""
-        return self.says.format(**values) if self.says else self.what
+        return read(self.says, values) if self.says else self.what
 
     def form(self, name: str | None = None) -> Form:
         """The form `name`, or the first; KeyError when there is none of that name."""

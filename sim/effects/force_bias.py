@@ -99,7 +99,7 @@ def _share(what: str) -> Parameter:
 EFFECT = Effect(
     id="force_bias",
     what="The reported force is off by a constant.",
-    says="the force is off by {bias:.4g} N, in free air too",
+    says="the force is off by {bias:force}, in free air too",
     check="tare in free air, with probe and cable as they are in the run",
     reference="OIML R 60, Metrological regulation for load cells",
     of_motion=False,

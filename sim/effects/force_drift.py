@@ -109,7 +109,7 @@ def _time_constant(what: str) -> Parameter:
 EFFECT = Effect(
     id="force_drift",
     what="The zero of the force wanders with time.",
-    says="the force drifts by {rate:.4g} N per second at the start",
+    says="the force {rate:rises/falls} by {rate:milli} mN per second at the start",
     check="let the cell warm up, and keep some free air before and after the run",
     reference="OIML R 60, Metrological regulation for load cells",
     of_motion=False,

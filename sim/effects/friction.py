@@ -301,7 +301,7 @@ def _tared(name: str, differs: float, came: str, felt: str) -> Form:
 EFFECT = Effect(
     id="friction",
     what="Friction at the probe acts against its motion and is felt by the load cell.",
-    says="friction of {coulomb:.4g} N acts against the motion, either way",
+    says="friction of {coulomb:force} acts against the motion, either way",
     check="align and grease the guide; see whether cable or seal drags; move slowly in free air and back",
     reference="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30, 1994, 1083-1138",
     forms=(

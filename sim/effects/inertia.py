@@ -167,7 +167,7 @@ def _oiled(values: Mapping[str, float]) -> tuple[float, ...]:
 EFFECT = Effect(
     id="inertia",
     what="The cell feels the force that accelerates the mass beyond it.",
-    says="a mass of {mass:.4g} kg beyond the cell is felt when the probe accelerates",
+    says="a mass of {mass:milli} g beyond the cell is felt when the probe accelerates",
     check="run the same moves in free air; weigh probe and adapter; lower the acceleration",
     reference="Meirovitch, Fundamentals of Vibrations, 2001",
     forms=(

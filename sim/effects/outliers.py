@@ -67,7 +67,7 @@ _SEED = Parameter("seed", "1", 0.0, 1e6, 1.0, "which samples", fixed=True)
 EFFECT = Effect(
     id="outliers",
     what="Single force samples are far off.",
-    says="{fraction:.3g} of the force samples are spikes",
+    says="{fraction:percent} of the force samples are spikes",
     check="look at cable, plugs and checksum errors; such samples are left out",
     reference="Huber, Robust Statistics, 1981",
     of_motion=False,

@@ -238,7 +238,7 @@ def _stated(what: str) -> tuple[Parameter, Parameter]:
 EFFECT = Effect(
     id="stress_softening",
     what="Below the deepest point reached the pad is softer (Mullins).",
-    says="below its deepest point the pad loses up to {share:.3g} of its force, over {depth:.3g} mm",
+    says="below its deepest point the pad loses up to {share:percent} of its force, over {depth:.3g} mm",
     check="precondition to the greatest depth of the protocol first, and let the pad rest",
     reference="Mullins, Rubber Chem. Technol. 42, 1969, 339-362",
     forms=(

@@ -62,7 +62,7 @@ _SEED = Parameter("seed", "1", 0.0, 1e6, 1.0, "when", fixed=True)
 EFFECT = Effect(
     id="stuck_samples",
     what="At times the force channel repeats its last value.",
-    says="{fraction:.3g} of the force samples repeat an old value",
+    says="{fraction:percent} of the force samples repeat an old value",
     check="poll the load cell no faster than it converts; look for lost frames; such samples are left out",
     reference="Isermann, Fault-Diagnosis Systems, 2006",
     of_motion=False,

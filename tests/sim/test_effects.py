@@ -92,7 +92,7 @@ class TestRegistry:
         assert "{" not in sentence
         for p in parameters:
             if p.amplitude and p.required:
-                assert f"{p.typical:.3g}" in sentence
+                assert any(f"{scale * p.typical:.3g} " in sentence for scale in (1.0, 100.0, 1000.0)), sentence
 
     @pytest.mark.parametrize(("name", "form"), EVERY_FORM)
     def test_at_amplitude_0_there_is_no_effect(self, name: str, form: str) -> None:
