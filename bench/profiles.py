@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.jit import compiled
+
 Array = NDArray[np.float64]
 
 SETTLED = 12.0  # time constants after which a lag has ended: what is left is less than a ten-thousandth
@@ -35,33 +37,6 @@ class Smoothing:
     def after_s(self) -> float:
         """For how long after a corner the motion still differs; before it, for `delay_s`."""
         return 0.5 * self.width_s + SETTLED * self.lag_s
-
-    def to_a_step(self, since_s: Array) -> tuple[Array, Array]:
-        """(position, speed) that an acceleration of 1, from 0 s on, has made."""
-        u = since_s + self.delay_s
-        if self.width_s <= 0.0:
-            return self._integral(3, u), self._integral(2, u)
-        later, width = u - self.width_s, self.width_s
-        return (
-            (self._integral(4, u) - self._integral(4, later)) / width,
-            (self._integral(3, u) - self._integral(3, later)) / width,
-        )
-
-    def _integral(self, times: int, u: Array) -> Array:
-        """The lag's response to an impulse, integrated so many times (2, 3 or 4), at u after it.
-
-        With s = u/τ: u − τ (2 − (2 + s) e^−s), u²/2 − 2 τ u + τ² (3 − (3 + s) e^−s), and so on.
-        """
-        u = np.maximum(u, 0.0)
-        if self.lag_s <= 0.0:
-            return np.asarray(u ** (times - 1) / math.factorial(times - 1))
-        tau = self.lag_s
-        gone = (times + u / tau) * np.exp(-u / tau)
-        if times == 2:
-            return np.asarray(u - tau * (2.0 - gone))
-        if times == 3:
-            return np.asarray(0.5 * u**2 - 2.0 * tau * u + tau**2 * (3.0 - gone))
-        return np.asarray(u**3 / 6.0 - tau * u**2 + 3.0 * tau**2 * u - tau**3 * (4.0 - gone))
 
 
 PLAIN = Smoothing()
@@ -102,13 +77,13 @@ class Trapezoid:
         return float(corners[0]), float(corners[-1]) + lagging
 
 
-def _corners(way: Array, speed: Array, acceleration: float | Array) -> tuple[Array, Array]:
+def _corners(way: Array, speed: Array, acceleration: float) -> tuple[Array, Array]:
     """How far from the middle, in time, the speed begins to rise, and has risen."""
     return (way / speed + speed / acceleration) / 2, np.maximum(way / speed - speed / acceleration, 0.0) / 2
 
 
 def profile(
-    tau: Array, way: Array, speed: Array, acceleration: float | Array, smoothing: Smoothing = PLAIN
+    tau: Array, way: Array, speed: Array, acceleration: float, smoothing: Smoothing = PLAIN
 ) -> tuple[Array, Array, Array]:
     """Way gone at τ from a trapezoid's middle, its derivatives by the middle's time and by the speed."""
     if smoothing != PLAIN:
@@ -125,15 +100,61 @@ def profile(
 
 
 def _smoothed(
-    tau: Array, way: Array, speed: Array, acceleration: float | Array, smoothing: Smoothing
+    tau: Array, way: Array, speed: Array, acceleration: float, smoothing: Smoothing
 ) -> tuple[Array, Array, Array]:
     long, short = _corners(way, speed, acceleration)
     by_long = (-way / speed**2 + 1 / acceleration) / 2
     by_short = np.where(short > 0.0, (-way / speed**2 - 1 / acceleration) / 2, 0.0)
-    (s1, v1), (s2, v2), (s3, v3), (s4, v4) = (
-        smoothing.to_a_step(tau + corner) for corner in (long, short, -short, -long)
+    moves = np.ascontiguousarray(np.stack([np.ravel(v) for v in (long, short, by_long, by_short)], axis=1))
+    out = np.empty((3, *tau.shape))
+    _walk(
+        np.ascontiguousarray(tau).reshape(len(moves), -1), moves, acceleration, smoothing.delay_s, smoothing.width_s,
+        smoothing.lag_s, out.reshape(3, len(moves), -1),
+    )  # fmt: skip
+    return out[0], out[1], out[2]
+
+
+@compiled("UniTuple(float64, 3)(float64, float64)")
+def _integrals(u: float, tau: float) -> tuple[float, float, float]:
+    """The lag's response to an impulse, integrated two, three and four times, at u after it.
+
+    With s = u/τ: u − τ (2 − (2 + s) e^−s), u²/2 − 2 τ u + τ² (3 − (3 + s) e^−s), and so on.
+    """
+    if u <= 0.0:
+        return 0.0, 0.0, 0.0
+    if tau <= 0.0:
+        return u, u * u / 2.0, u * u * u / 6.0
+    s = u / tau
+    gone = math.exp(-s) if s < 700.0 else 0.0
+    return (
+        u - tau * (2.0 - (2.0 + s) * gone),
+        0.5 * u * u - 2.0 * tau * u + tau * tau * (3.0 - (3.0 + s) * gone),
+        u * u * u / 6.0 - tau * u * u + 3.0 * tau * tau * u - tau * tau * tau * (4.0 - (4.0 + s) * gone),
     )
-    gone = acceleration * (s1 - s2 - s3 + s4)
-    by_middle = -acceleration * (v1 - v2 - v3 + v4)
-    by_speed = acceleration * ((v1 - v4) * by_long - (v2 - v3) * by_short)
-    return gone, by_middle, by_speed
+
+
+@compiled("UniTuple(float64, 2)(float64, float64, float64)")
+def _to_a_step(u: float, width: float, tau: float) -> tuple[float, float]:
+    """(position, speed) that an acceleration of 1 has made, u after it was felt first."""
+    once, twice, thrice = _integrals(u, tau)
+    if width <= 0.0:
+        return twice, once
+    _, later_twice, later_thrice = _integrals(u - width, tau)
+    return (thrice - later_thrice) / width, (twice - later_twice) / width
+
+
+@compiled("void(float64[:, ::1], float64[:, ::1], float64, float64, float64, float64, float64[:, :, ::1])")
+def _walk(tau: Array, moves: Array, acceleration: float, delay: float, width: float, lag: float, out: Array) -> None:
+    """`out` (3, m, w): way gone at `tau` (m, w) from the middle of each move, its derivatives by the middle's time and
+    by the speed. `moves` (m, 4): its corners long and short, and their derivatives by the speed."""
+    for i in range(tau.shape[0]):
+        long, short, by_long, by_short = moves[i, 0], moves[i, 1], moves[i, 2], moves[i, 3]
+        for j in range(tau.shape[1]):
+            u = tau[i, j] + delay
+            s1, v1 = _to_a_step(u + long, width, lag)
+            s2, v2 = _to_a_step(u + short, width, lag)
+            s3, v3 = _to_a_step(u - short, width, lag)
+            s4, v4 = _to_a_step(u - long, width, lag)
+            out[0, i, j] = acceleration * (s1 - s2 - s3 + s4)
+            out[1, i, j] = -acceleration * (v1 - v2 - v3 + v4)
+            out[2, i, j] = acceleration * ((v1 - v4) * by_long - (v2 - v3) * by_short)

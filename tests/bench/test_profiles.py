@@ -37,9 +37,7 @@ def test_a_smoothed_move_is_the_trapezoid_s_after_the_smoothing(smoothing: Smoot
     assert_allclose(late.position(t[t > end_s]), 1.2, atol=3e-5)
 
 
-@pytest.mark.parametrize(
-    "smoothing", [PLAIN, SMOOTHINGS[0], *(pytest.param(s, marks=pytest.mark.long) for s in SMOOTHINGS[1:])]
-)
+@pytest.mark.parametrize("smoothing", [PLAIN, *SMOOTHINGS])
 def test_derivatives_are_those_of_the_way(smoothing: Smoothing) -> None:
     tau, way = np.linspace(-0.06, 0.06, 241), np.array(0.9)
     _, by_middle, by_speed = profile(tau, way, np.array(24.0), 2500.0, smoothing)
@@ -58,7 +56,9 @@ def test_derivatives_are_those_of_the_way(smoothing: Smoothing) -> None:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("smoothing", [PLAIN, *SMOOTHINGS])
+@pytest.mark.parametrize(
+    "smoothing", [PLAIN, SMOOTHINGS[2], *(pytest.param(s, marks=pytest.mark.long) for s in SMOOTHINGS[:2])]
+)
 @pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2))])
 def test_what_smooths_the_moves_is_found_in_noisy_positions(smoothing: Smoothing, seed: int) -> None:
     rng, t = np.random.default_rng(seed), np.arange(0.0, 12.0, 2e-3)
