@@ -143,7 +143,7 @@ def runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 def _ceiling(force: Array) -> tuple[Mask, float | None]:
     """Samples at the greatest (or least) value, where many in a row share it and nothing is beyond but a few strays; or
     a few, in a channel in which no other two in a row are equal."""
-    mask = np.zeros(len(force), dtype=bool)
+    mask, step = np.zeros(len(force), dtype=bool), resolution(force)
     first, length = runs(force)
     span = float(np.ptp(force))
     if span == 0.0:
@@ -158,11 +158,15 @@ def _ceiling(force: Array) -> tuple[Mask, float | None]:
         beyond = (sign * force > top + 1e-9 * span) & ~spike
         others = length[~at] if (~at).any() else np.ones(1)
         # Elsewhere runs are as long as resolution and noise make them: a ceiling's are of another size.
-        ends = int(length[at].max()) >= max(CEILING, 3.0 * float(np.quantile(others, 0.999)))
-        ends = ends and beyond.sum() <= FEW_BESIDE * int(length[at].sum())
+        longest = max(CEILING, 3.0 * float(np.quantile(others, 0.999)))
+        ends = int(length[at].max()) >= longest and beyond.sum() <= FEW_BESIDE * int(length[at].sum())
         held = np.repeat(at, length)
         if ends or (int(others.max()) == 1 and not beyond.any() and _tops(sign * force, top, held)):
             return held, sign * top
+        # a coarse channel below a ceiling that is not sharp says one value for long, and the next one now and then
+        near = np.abs(sign * force[first] - top) < NEXT * step
+        if step > 0.0 and length[near].max() >= longest and beyond.sum() <= FEW_BESIDE * int(length[near].sum()):
+            return np.repeat(near, length), sign * top
     return mask, None
 
 

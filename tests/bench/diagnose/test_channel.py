@@ -154,6 +154,21 @@ def test_a_run_of_one_value_near_the_greatest_force_sticks_and_is_no_ceiling():
         assert found.stuck[top + 24 : top + 41].all()
 
 
+def test_a_coarse_channel_that_ends_softly_does_not_stick():
+    """Where it ends it says one value for long, and for a while the next one: no noise is left to tell."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        force = np.repeat([0.0, 0.8, 1.5, 1.9, 1.2, 0.0, 0.5], 600) + 0.006 * rng.standard_normal(4200)
+        code = np.round(force / 0.0048)
+        above = np.zeros(4200, dtype=bool)
+        above[3100:3220] = True
+        code[above] = 446
+        code[3100:3110] = 447  # as high as it gets, for a moment
+        found = faults(code * 0.0048)
+        assert not found.stuck.any()
+        assert np.array_equal(found.saturated, above)
+
+
 def test_strays_beyond_a_ceiling_do_not_hide_it():
     """Stray samples beyond what the channel reports are strays; where it stays at one value is its ceiling."""
     for seed in SEEDS:
