@@ -264,7 +264,6 @@ EFFECT = Effect(
                 Parameter("takes", "1", 0.05, 1.0, 0.5, "share of what is missing that a touch takes", starts=(0.5,)),
                 Parameter("leaks", "s", 0.1, 1e3, 10.0, "time in which it leaks to 1/e in air", starts=(10.0,)),
             ),
-            sought=False,
             blocks={"gap": charging},
             state=(0.0, 0.0),
         ),

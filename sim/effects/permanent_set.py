@@ -182,7 +182,6 @@ EFFECT = Effect(
                 _SET,
                 Parameter("limit", "mm", 0.0, 50.0, 0.5, "depth that leaves no trace", bend=True),
             ),
-            sought=False,
             blocks={"depth": springing},
             state=(0.0,),
         ),
