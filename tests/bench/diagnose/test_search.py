@@ -47,6 +47,16 @@ def test_a_form_whose_valley_is_apart_from_the_best_ones_is_found(seed):
     assert fit.chi2 < 1.1 * search.expected
 
 
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3))])
+def test_a_form_that_no_other_of_its_family_is_like_is_found(seed):
+    """A pull of charges, which is there on the way in too and leaks away in air, is nothing to those of bonds."""
+    c = draw_case(seed, ("adhesion",), 2.5, "charged", protocol="rich", rate_hz=150.0, jitter="none")
+    search, base = begun(c)
+    trial = search.ranked(base)[0]
+    assert (trial.id, trial.cause.form.name) == ("adhesion", "charging")
+    assert trial.fit.chi2 < 1.1 * search.expected
+
+
 @pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (3, 9))])
 def test_a_missing_mode_is_found_though_the_others_have_spread_over_its_place(seed):
     """From where too few modes have ended, steps along one more of them lead far away."""
