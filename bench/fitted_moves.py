@@ -36,8 +36,8 @@ SOME = 0.15  # of the moves, that it must explain
 
 @dataclass
 class _Sampled:
-    """Moves from rest to rest, padded to one width: `time_s`, `gone` (way since the start, ≥ 0), `used`: (m, w);
-    `duration` (m,): the longest that its cruise can take."""
+    """Moves from rest to rest, padded to one width: `time_s`, `gone` (way since the start, ≥ 0), `used`: (m, w).
+    `middle`, `speed` (m,): where a fit begins; `duration` (m,): the longest that a cruise can take."""
 
     time_s: Array
     gone: Array
@@ -103,10 +103,8 @@ def _asked(
         return None
     rest, starts, ends = [g for g, goes in zip(rest, on, strict=True) if goes], starts[on], ends[on]
     noise = noise[on] if isinstance(noise, np.ndarray) else noise
-    moves = _sampled(t, x, rest, starts, ends, x if fitted is None else fitted, most)
-    allowed = np.maximum(4 * noise, SLACK * moves.way)
-    # what a move begins and ends with may hide in the noise of the rests, so that it took longer than it is seen to
-    moves.duration /= np.maximum(1.0 - 2.0 * allowed / moves.way, 0.5)
+    allowed = np.maximum(4 * noise, SLACK * np.abs(ends - starts))
+    moves = _sampled(t, x, rest, starts, ends, x if fitted is None else fitted, most, allowed)
     asked = _Asked(rest, starts, ends, moves, allowed)
     return asked if asked.told.any() else None
 
@@ -146,7 +144,7 @@ def fitted_moves(
     cruised = told & (speed < 0.97 * np.sqrt(acceleration * moves.way))
     if lone.any():  # one sample inside tells when, not how fast: as the others
         usual = float(np.median(speed[cruised])) if cruised.any() else np.inf
-        moves.speed = np.where(lone, np.maximum(usual, moves.way / moves.duration), speed)
+        moves.speed = np.where(lone, BEGUN * np.maximum(usual, moves.way / moves.duration), speed)
         alone = _fitted(moves, acceleration, smoothing, lone)
         middle, speed, squares = (
             np.where(lone, new, old) for new, old in zip(alone, (middle, speed, squares), strict=True)
@@ -154,7 +152,10 @@ def fitted_moves(
     good = np.sqrt(squares / np.maximum(moves.count, 1)) <= allowed
     if fitted is not None:
         for k in np.flatnonzero(good & (moves.count == most)).tolist():
-            middle[k], speed[k] = _of_all(t, x, fitted, asked, k, middle[k], speed[k], acceleration, smoothing)
+            one = slice(k, k + 1)  # by all its samples, from what a few of them tell
+            whole = _sampled(t, x, asked.groups[one], asked.starts[one], asked.ends[one], fitted, len(t), allowed[one])
+            whole.middle, whole.speed = middle[one], speed[one]
+            (middle[k],), (speed[k],), _ = _fitted(whole, acceleration, smoothing)
     more = moves.count >= 3
     if more.any() and np.mean(good[more]) < 0.5:
         return {}  # no trapezoids: those with too few samples to tell are none either
@@ -261,7 +262,9 @@ def _of_rests(
     return np.where(begins, x[before], starts), np.where(stops, x[after], ends)
 
 
-def _sampled(t: Array, x: Array, groups: list[Group], starts: Array, ends: Array, fitted: Array, most: int) -> _Sampled:
+def _sampled(
+    t: Array, x: Array, groups: list[Group], starts: Array, ends: Array, fitted: Array, most: int, allowed: Array
+) -> _Sampled:
     picked = []
     for first, last in groups:
         inside = np.arange(first + 1, last)
@@ -279,9 +282,11 @@ def _sampled(t: Array, x: Array, groups: list[Group], starts: Array, ends: Array
         time[k, : len(p)], gone[k, : len(p)] = t[p], sign * (fitted[p] - starts[k])
         along = sign * (x[first : last + 1] - starts[k])
         middle[k] = np.interp(way[k] / 2, np.maximum.accumulate(along), t[first : last + 1])
-        speed[k] = np.max(np.diff(along) / np.diff(t[first : last + 1]))
+        speed[k] = BEGUN * np.max(np.diff(along) / np.diff(t[first : last + 1]))
     firsts, lasts = np.array([g[0] for g in groups]), np.array([g[1] for g in groups])
-    return _Sampled(time, gone, used, way, middle, speed, np.array([len(p) for p in picked]), t[lasts] - t[firsts])
+    # what a move begins and ends with may hide in the noise of the rests, so that it took longer than it is seen to
+    duration = (t[lasts] - t[firsts]) / np.maximum(1.0 - 2.0 * allowed / way, 0.5)
+    return _Sampled(time, gone, used, way, middle, speed, np.array([len(p) for p in picked]), duration)
 
 
 def _fitted(
@@ -290,7 +295,7 @@ def _fitted(
     """Middle, speed and Σ error² of each move, by damped Gauss-Newton steps on all moves at once, (m,) each."""
     fastest = np.sqrt(acceleration * moves.way)
     slowest = moves.way / moves.duration
-    middle, speed = moves.middle.copy(), np.clip(BEGUN * moves.speed, np.minimum(slowest, fastest), fastest)
+    middle, speed = moves.middle.copy(), np.clip(moves.speed, np.minimum(slowest, fastest), fastest)
     kept = np.zeros(len(middle), dtype=bool) if speed_kept is None else speed_kept
     damping = np.full(len(middle), 1e-3)
 
@@ -325,19 +330,6 @@ def _fitted(
         if not better.any():
             break
     return middle, speed, squares
-
-
-def _of_all(
-    t: Array, x: Array, fitted: Array, asked: _Asked, k: int, middle: float, speed: float, acceleration: float,
-    smoothing: Smoothing,
-) -> tuple[float, float]:  # fmt: skip
-    """Middle and speed of one move by all its samples, from those that a few of them tell."""
-    here = slice(k, k + 1)
-    whole = _sampled(t, x, asked.groups[here], asked.starts[here], asked.ends[here], fitted, len(t))
-    whole.duration = asked.moves.duration[here]
-    whole.middle, whole.speed = np.array([middle]), np.array([speed / BEGUN])
-    middles, speeds, _ = _fitted(whole, acceleration, smoothing)
-    return float(middles[0]), float(speeds[0])
 
 
 def _golden(f: Callable[[float], float], low: float, high: float) -> float:

@@ -105,7 +105,7 @@ def _smoothed(
     long, short = _corners(way, speed, acceleration)
     by_long = (-way / speed**2 + 1 / acceleration) / 2
     by_short = np.where(short > 0.0, (-way / speed**2 - 1 / acceleration) / 2, 0.0)
-    moves = np.ascontiguousarray(np.stack([np.ravel(v) for v in (long, short, by_long, by_short)], axis=1))
+    moves = np.stack([np.ravel(v) for v in (long, short, by_long, by_short)], axis=1)
     out = np.empty((3, *tau.shape))
     _walk(
         np.ascontiguousarray(tau).reshape(len(moves), -1), moves, acceleration, smoothing.delay_s, smoothing.width_s,

@@ -159,14 +159,14 @@ def _ceiling(force: Array) -> tuple[Mask, float | None]:
         others = length[~at] if (~at).any() else np.ones(1)
         # Elsewhere runs are as long as resolution and noise make them: a ceiling's are of another size.
         longest = max(CEILING, 3.0 * float(np.quantile(others, 0.999)))
-        ends = int(length[at].max()) >= longest and beyond.sum() <= FEW_BESIDE * int(length[at].sum())
+        # a coarse channel below a ceiling that is not sharp says one value for long, and the next one for a while
+        near = at | (np.abs(sign * force[first] - top) < NEXT * step)
+        for told in (at, near):
+            if length[told].max() >= longest and beyond.sum() <= FEW_BESIDE * int(length[told].sum()):
+                return np.repeat(told, length), sign * top
         held = np.repeat(at, length)
-        if ends or (int(others.max()) == 1 and not beyond.any() and _tops(sign * force, top, held)):
+        if int(others.max()) == 1 and not beyond.any() and _tops(sign * force, top, held):
             return held, sign * top
-        # a coarse channel below a ceiling that is not sharp says one value for long, and the next one now and then
-        near = np.abs(sign * force[first] - top) < NEXT * step
-        if step > 0.0 and length[near].max() >= longest and beyond.sum() <= FEW_BESIDE * int(length[near].sum()):
-            return np.repeat(near, length), sign * top
     return mask, None
 
 
