@@ -49,6 +49,21 @@ CONTRACT = {
 }
 """The table of the file formats: id, and the parameters that a file must give."""
 
+WRITTEN = {
+    "N": (1e3, "mN"),
+    "N/s": (1e3, "mN per second"),
+    "N*s/mm": (1.0, "N per mm/s"),
+    "mm": (1.0, "mm"),
+    "mm/mm": (1.0, "mm per mm"),
+    "mm/N": (1.0, "mm per N"),
+    "1/mm": (1e2, "% "),
+    "1": (1e2, "% "),
+    "s": (1e3, "ms"),
+    "ppm": (1.0, "microseconds a second"),
+    "kg": (1e3, "g "),
+}
+"""How a sentence for people writes a typical size of each unit: times what, and in which words."""
+
 WITHOUT_AMPLITUDE = {
     "resonance": {"low_pass", "transmitted", "amplifier", "mounted", "pair", "antiresonance", "loaded", "damper"},
     "saturation": None,
@@ -92,7 +107,8 @@ class TestRegistry:
         assert "{" not in sentence
         for p in parameters:
             if p.amplitude and p.required:
-                assert any(f"{scale * p.typical:.3g} " in sentence for scale in (1.0, 100.0, 1000.0)), sentence
+                scale, unit = WRITTEN[p.unit]
+                assert f" {scale * p.typical:.3g} {unit}" in f" {sentence}"
 
     @pytest.mark.parametrize(("name", "form"), EVERY_FORM)
     def test_at_amplitude_0_there_is_no_effect(self, name: str, form: str) -> None:

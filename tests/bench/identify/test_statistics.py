@@ -103,9 +103,8 @@ def test_undetermined_where_the_bound_says_so() -> None:
 @pytest.mark.parametrize(
     "pad",
     [
-        pytest.param(
-            Pad(Exponential(2.24, 0.69), (0.25, 0.2), (4.0, 0.004)), marks=pytest.mark.long
-        ),  # a time constant of four minutes, in 20 s
+        # a time constant of four minutes, in 20 s
+        pytest.param(Pad(Exponential(2.24, 0.69), (0.25, 0.2), (4.0, 0.004)), marks=pytest.mark.long),
         pytest.param(Pad(Exponential(2.24, 0.69), (0.25, 0.1), (4.0, 0.001)), marks=pytest.mark.long),
         Pad(Exponential(2.24, 0.69), (0.25, 0.15), (4.0, 3.4)),  # two rates that are one
     ],
