@@ -23,14 +23,14 @@ from .candidates import CHANNEL
 from .channel import Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
-from .evidence import MOST_LEFT, SPEAKS, beyond_limit, of_slow_force
+from .evidence import MOST_LEFT, SPEAKS, beyond_limit, its_own, of_slow_force
 from .held_out import SEEN, held_out_square, later_square
 from .hum import Line
 from .hum import find as line_of
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
-from .refit import Fit, extended, force_at, mean_square, onto, placed, refit
+from .refit import Fit, extended, force_at, last, mean_square, onto, placed, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
 from .search import Search
@@ -38,7 +38,7 @@ from .shapes import reshaped
 from .spread import covariance
 from .swing import Swing
 from .swing import find as swinging
-from .verdict import chain, excesses, explains, found, ordered, seen, sureness, told_size, without
+from .verdict import chain, excesses, explains, found, no_size, ordered, seen, sureness, told_size, without
 from .way import most_sure
 from .write import model_of
 
@@ -91,9 +91,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     floor = _floor(prepared, final)
     fits, squares, excess = _needed(prepared, path, final, floor)
     whole = _whole(prepared, fits, search.believed)
-    gone = _faded(fits, whole[1])
-    gone = _untold(fits, whole[1], excess) if gone is None else gone
-    if gone is not None:
+    while (gone := _gone(prepared, fits, whole[1], excess)) is not None:
         fits, squares, excess = _dropped(prepared, path, fits, gone, floor)
         whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
@@ -148,17 +146,17 @@ def _needless(
     own = len(fits[0].structure.causes)
     floor = squares[-1] - excess[-1]
     scale = excess[0] + apart
-    last = len(fits) - 2
-    order = sorted(range(last + 1), key=lambda k: squares[k] - squares[k + 1])
+    end = len(fits) - 2
+    order = sorted(range(end + 1), key=lambda k: squares[k] - squares[k + 1])
     for k in order:
         taken, gain, left = squares[k] - squares[k + 1], excess[k] - excess[k + 1], excess[k]
-        if k < last and gain <= FURTHER * scale and squares[k + 1] <= HARM * squares[k]:
+        if k < end and gain <= FURTHER * scale and squares[k + 1] <= HARM * squares[k]:
             # of two that hide each other neither is of use alone; but neither does it harm
             alone = held_out_square(prepared, without(prepared, fits[-1], own + k))
             taken, gain, left = alone - squares[-1], max(alone - floor, 0.0) - excess[-1], max(alone - floor, 0.0)
         if taken <= 0.0:
             return k
-        small = gain <= (LEAST if last == 0 else FURTHER) * scale
+        small = gain <= (LEAST if end == 0 else FURTHER) * scale
         most_left = k < 2 and gain >= MOST_LEFT * (left - slow[k]) and gain >= SPEAKS * prepared.floor_N**2
         if small and not most_left:
             return k
@@ -171,9 +169,9 @@ def _needless(
     causes = fits[-1].structure.causes[own:]
     drifts = [c.id == "force_drift" and excess[k] - excess[k + 1] > NEARLY_ALL * scale for k, c in enumerate(causes)]
     rest = [
-        np.inf if drifts[k] else later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(last + 1)
+        np.inf if drifts[k] else later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(end + 1)
     ]
-    for k in range(last + 1):  # what it takes of all that was held out may be more than it does harm to the end alone
+    for k in range(end + 1):  # what it takes of all that was held out may be more than it does harm to the end alone
         if excess[k + 1] < MOST * excess[k] and squares[k] - squares[k + 1] > (1.0 - SEEN) * (later - rest[k]):
             rest[k] = np.inf
     best = int(np.argmin(rest))
@@ -218,14 +216,14 @@ def _floor(prepared: Prepared, final: Fit) -> float:
 def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fit, Fit]:
     """First and last fit carried to the end on all the data, with the hum that the last one then has to make."""
     full, data, mains = prepared.full, prepared.full, prepared.mains
-    before, last = onto(fits[0], full, 6, 1e-8), replace(fits[-1], x=missing_told(fits[-1], believed))
+    before, all_found = onto(fits[0], full, 6, 1e-8), replace(fits[-1], x=missing_told(fits[-1], believed))
     if mains is None:
-        after = onto(last, full, 6, 1e-8)
+        after = onto(all_found, full, 6, 1e-8)
     else:
-        data, structure = prepared.raw, last.structure.with_cause(hum_cause(_retimed(prepared, last, mains)))
+        data, structure = prepared.raw, all_found.structure.with_cause(hum_cause(_retimed(prepared, all_found, mains)))
         hum = structure.of_cause(len(structure.causes) - 1)
-        own = structure.x(last.x[: len(structure.pad.coordinates)], None)[hum]
-        after = refit(data, structure, extended(last, own), 8, 1e-8)
+        own = structure.x(all_found.x[: len(structure.pad.coordinates)], None)[hum]
+        after = refit(data, structure, extended(all_found, own), 8, 1e-8)
     after = _spread(prepared, data, after)
     if prepared.felt.total_N.any():
         before, after = placed(full, before), placed(data, after)
@@ -246,6 +244,14 @@ def _retimed(prepared: Prepared, fit: Fit, mains: Line) -> Line:
     return line if line is not None and near and line.of_the_mains else mains
 
 
+def _gone(prepared: Prepared, fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
+    """Number of a cause that is none once all is fitted together; None: all are."""
+    for number in (_faded(fits, whole), _untold(fits, whole, excess), _anothers(prepared, fits, whole, excess)):
+        if number is not None:
+            return number
+    return None
+
+
 def _faded(fits: list[Fit], whole: Fit) -> int | None:
     """Number of a cause of which next to nothing is left once all is fitted together, the hum too; None: there is
     none."""
@@ -264,6 +270,19 @@ def _untold(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     own = len(fits[0].structure.causes)
     for k in range(len(fits) - 1, 1, -1):
         if _takes_little(excess, k, excess[0]) and told_size(whole, own + k - 1) < DOUBTED:
+            return k - 1
+    return None
+
+
+def _anothers(prepared: Prepared, fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
+    """Number of a further cause that takes little and is another's limit: it has a number at its bound, or does nothing
+    but split the steps in which the others are worked out; None: there is none."""
+    own = len(fits[0].structure.causes)
+    for k in range(len(fits) - 1, 1, -1):
+        index = own + k - 1
+        alone = last(whole, whole.structure.causes[index].id)
+        nothing = no_size(whole, index) or not its_own(alone, prepared)
+        if nothing and excess[k - 1] - excess[k] < LITTLE * excess[0]:
             return k - 1
     return None
 

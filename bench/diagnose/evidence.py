@@ -155,13 +155,13 @@ def _ends(fit: Fit, prepared: Prepared) -> bool:
 
 def believable(fit: Fit, prepared: Prepared) -> bool:
     """Whether the last cause's numbers are beyond what such data could show at all, and its own."""
-    return _own(fit, prepared) and not _small(fit, prepared)
+    return its_own(fit, prepared) and not _small(fit, prepared)
 
 
 def too_small(fit: Fit, prepared: Prepared) -> bool:
     """Whether all that speaks against the last cause is that such data could not show so little: it is not named, but
     neither is it excluded."""
-    return _own(fit, prepared) and _small(fit, prepared)
+    return its_own(fit, prepared) and _small(fit, prepared)
 
 
 def _small(fit: Fit, prepared: Prepared) -> bool:
@@ -182,7 +182,7 @@ def _small(fit: Fit, prepared: Prepared) -> bool:
     return any(abs(values[name]) < share * limits[of] for name, (of, share) in floors)
 
 
-def _own(fit: Fit, prepared: Prepared) -> bool:
+def its_own(fit: Fit, prepared: Prepared) -> bool:
     """Whether the last cause is clear of its bounds: there it is another's limit, as a wave longer than the data is, a
     pull of any reach, or a mode so damped that it is a lag. (Another law is one at any of its numbers.)"""
     cause = fit.structure.causes[-1]

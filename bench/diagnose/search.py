@@ -44,6 +44,7 @@ AS_WELL = 0.8  # the same, of a second cause of a kind beside the first
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
 CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
+A_SHAPE = 0.1  # of what is left beyond the noise, that another shape of a cause takes where no further cause pays
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 BETTER = 10.0  # Δχ², times what the best leaves over what noise does: for less no cause is exchanged
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
@@ -52,7 +53,6 @@ SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
 RIVALS = 2  # beside the best, that are asked for their best shapes
 LONG_WAVES = 3  # starts of a wave that is longer than those sought
-SHAPES = 6  # starts of other forms of the causes found that are carried on
 COMPARED = 5  # rivals of a cause that is compared anew
 LATER_BY_CHANCE = 1.3  # times what was known of it
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
@@ -170,6 +170,8 @@ class Search(Sieve):
         now, best = path.fits[-1], turn.ranked[0]
         other = self.recurved(now) if again else now
         same = other is not now and now.chi2 - other.chi2 > SAME * (now.chi2 - best.fit.chi2)
+        if not turn.found.pays and now.chi2 - other.chi2 > A_SHAPE * (now.chi2 - self.expected):
+            return other  # what its old shape missed may have hidden what comes next
         if turn.found.pays or same:
             shaped = self._in_shape(now, turn.ranked, len(path.fits) == 1, same)
             if len(path.fits) > 1 or not self._two_instead(path, best, shaped[0]):
@@ -181,6 +183,8 @@ class Search(Sieve):
         if turn.ranked[0] is not best:
             best = turn.ranked[0]
             turn.found = self._lead(path, best)
+            if again and _shapes(path.fits[-1]) != _shapes(now):
+                return path.fits[-1]  # those further behind stand beside another shape too
             now = path.fits[-1]
         if turn.beside is not None and self._reshaped(now.chi2, best.fit.chi2, turn.beside.fit.chi2):
             united = self._united(now, turn.beside)
@@ -293,6 +297,8 @@ class Search(Sieve):
         second = next((t for t in further if believable(t.fit, self.prepared)), None)
         if second is None or second.score > shaped.score - RIVAL * self.prepared.memory:
             return False
+        if second.fit.free > shaped.fit.free:  # it is the same curve of many numbers, and another beside it
+            return False
         return self._clean(now.chi2, second.fit.chi2) and self.judge(plain.fit, second.fit, now).pays
 
     def _plain_first(self, path: Path, ranked: list[Trial]) -> list[Trial]:
@@ -403,8 +409,9 @@ class Search(Sieve):
             first = [
                 t for t in pool.map(lambda start: self._joined(start[0], start[1], FEW, None), begun) if t is not None
             ]
-            first.sort(key=lambda t: t.score)
-            tried = list(pool.map(lambda t: self._carried(t, MORE), first[:SHAPES]))
+            # each form on from its best start: one with a long way to go is behind after a few steps
+            best = {(t.id, t.cause.form.name): t for t in sorted(first, key=lambda t: -t.score)}
+            tried = list(pool.map(lambda t: self._carried(t, MORE), best.values()))
         near = [t for t in tried if not departed(t.fit, len(t.fit.structure.causes) - 1)]
         of_a_form = {(t.id, t.cause.form.name): t for t in sorted(near, key=lambda t: -t.score)}
         fits = [self._carried(t, ALL).fit for t in sorted(of_a_form.values(), key=lambda t: t.score)[:2]]
@@ -478,3 +485,7 @@ class Search(Sieve):
     def _to_beat(self, fit: Fit) -> float:
         """The score below which another fit is better by more than what both leave."""
         return fit.chi2 + self._penalty(fit) - BETTER * max(fit.chi2 / self.expected, 1.0)
+
+
+def _shapes(fit: Fit) -> list[tuple[str, str]]:
+    return [(cause.id, cause.form.name) for cause in fit.structure.causes]

@@ -22,6 +22,7 @@ EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
 UNSEEN = 0.2  # of the noise power: what no test of structure sees of what is left; so far off may the noise be told
 TOLD_SIZE = 0.25  # of a cause's size, that its standard deviation may be for a sure name
+NOTHING = 0.1  # of its standard deviation, that a size is
 HARDLY = 0.3  # sure of a name
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
@@ -190,6 +191,15 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
 def told_size(final: Fit, index: int) -> float:
     """How sure the name of a fit's cause can be at the most, as its size is told."""
     return _of_its_size(final.structure.causes[index], described(final, index)[2])
+
+
+def no_size(final: Fit, index: int) -> bool:
+    """Whether a fit's cause does nothing: its size is far within its own deviation."""
+    size, numbers = final.structure.causes[index].amplitude, described(final, index)[2]
+    if size is None or size.fixed or size.name not in numbers:
+        return False
+    number = numbers[size.name]
+    return abs(number.value) < NOTHING * number.std
 
 
 def _of_its_size(cause: Cause, numbers: Mapping[str, Number]) -> float:

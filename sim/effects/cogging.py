@@ -3,6 +3,10 @@
 - `sine`: amplitude · sin(2π y/period + phase).
 - `tared`: the sine less its value at the first sample, where the force was taken for zero.
 - `harmonics`: with a second harmonic, ratio · amplitude.
+- `unbalanced`: a sine at any load, and its second harmonic that goes with the load, amplitude · (sin(θ + phase)
+  + ratio (y/at_depth)^exponent sin(2θ + second_phase)): the motor's current sensors have an offset, and gains that
+  differ (S. Chen, C. Namuduri, S. Mir, Controller-induced parasitic torque ripples in a PM synchronous motor, IEEE
+  Trans. Ind. Appl. 38, 2002, 1273–1281).
 - `swelling`: the sine grows along the way, as towards the end of the magnets: amplitude · (1 + growth (y − at_depth)).
 - `trailing`: the sine of a place that is dragged along, as iron's field is behind the magnets': the middle of a play of
   the full width `trail`.
@@ -49,6 +53,14 @@ def tared(dt: float, y: float, state: State, p: State) -> float:
         state[1] = y
     wave = 2.0 * math.pi / p[1]
     return p[0] * (math.sin(wave * y + p[2]) - math.sin(wave * state[1] + p[2]))
+
+
+@block
+def unbalanced(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, ratio, second_phase, exponent, at_depth)."""
+    angle = 2.0 * math.pi * y / p[1]
+    load = (y / p[6]) ** p[5] if y > 0.0 else 0.0
+    return p[0] * (math.sin(angle + p[2]) + p[3] * load * math.sin(2.0 * angle + p[4]))
 
 
 @block
@@ -176,6 +188,20 @@ EFFECT = Effect(
             parameters=(_AMPLITUDE, _PERIOD, PHASE, *SECOND_HARMONIC),
             blocks={"probe": two_periods},
             pack=_second_harmonic,
+        ),
+        Form(
+            name="unbalanced",
+            what="a sine, and its second harmonic, which goes with the load",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                *SECOND_HARMONIC,
+                Parameter("exponent", "1", 0.5, 4.0, 1.5, "of the load by the depth"),
+                GROWTH[1],
+            ),
+            sought=False,
+            blocks={"probe": unbalanced},
         ),
         Form(
             name="swelling",

@@ -217,6 +217,15 @@ class TestWhatGoesOnByItself:
             assert_allclose(force[:101], K * x[:101], atol=1e-9)
             assert force[-1] == pytest.approx(K * ends, rel=1e-3)
 
+    def test_current_sensors_whose_gains_differ(self) -> None:
+        x = ramp(2.0, 401)
+        numbers = {"amplitude": 0.1, "period": 0.7, "phase": 0.3, "ratio": 0.8, "second_phase": -1.1, "exponent": 2.0}
+        force = simulate(
+            AIR, [active("cogging", "unbalanced", at_depth=1.0, **numbers)], 0.01 * np.arange(x.size), x - 1
+        )
+        angle, load = 2 * np.pi * (x - 1) / 0.7, np.maximum(x - 1, 0.0) ** 2
+        assert_allclose(force, 0.1 * (np.sin(angle + 0.3) + 0.8 * load * np.sin(2 * angle - 1.1)), atol=1e-9)
+
     def test_magnets_that_the_load_weakens(self) -> None:
         x = ramp(2.0, 401)
         wave = active("cogging", "weakening", amplitude=0.1, period=0.7, phase=0.3, lost=0.5, reach=2.0)

@@ -137,3 +137,26 @@ def test_a_further_cause_without_a_size_goes_where_it_takes_little(monkeypatch, 
     monkeypatch.setattr(module, "told_size", lambda whole, index: sizes[index])
     fits: list[Any] = [SimpleNamespace(structure=SimpleNamespace(causes=())) for _ in excess]
     assert module._untold(fits, fits[-1], excess) == gone
+
+
+@pytest.mark.parametrize(
+    ("nothing", "within", "excess", "gone"),
+    [
+        ([False, True], [True, True], [1.0, 0.001, 0.0], 1),
+        ([False, False], [True, False], [1.0, 0.001, 0.0], 1),
+        ([False, False], [True, True], [1.0, 0.001, 0.0], None),
+        ([False, True], [True, False], [1.0, 0.3, 0.0], None),
+        ([True, False], [False, True], [1.0, 0.001, 0.0], None),
+    ],
+    ids=["does nothing", "at its bound", "a cause", "takes much", "the first stays"],
+)
+def test_a_further_cause_that_is_anothers_limit_goes_where_it_takes_little(monkeypatch, nothing, within, excess, gone):
+    """A mode as fast as the sampling beside a lag; a skew of nothing beside a film that tears within a step."""
+    causes = tuple(SimpleNamespace(id=i, number=k) for k, i in enumerate(("sensor_lag", "missing_relaxation_mode")))
+    monkeypatch.setattr(module, "no_size", lambda whole, index: nothing[index])
+    monkeypatch.setattr(module, "last", lambda fit, id_: next(c for c in causes if c.id == id_))
+    monkeypatch.setattr(module, "its_own", lambda cause, prepared: within[cause.number])
+    whole: Any = SimpleNamespace(structure=SimpleNamespace(causes=causes))
+    fits: list[Any] = [SimpleNamespace(structure=SimpleNamespace(causes=causes[:k])) for k in range(3)]
+    prepared: Any = None
+    assert module._anothers(prepared, fits, whole, excess) == gone

@@ -209,22 +209,23 @@ def test_a_softening_that_bends_at_a_depth_is_found_wherever_that_is(seed):
 
 
 @pytest.mark.parametrize(
-    ("leaves", "free", "left", "first"),
+    ("leaves", "free", "left", "both", "first"),
     [
-        (3000.0, 6, 1010.0, "force_bias"),  # with a second it leaves nothing
-        (3000.0, 6, 2900.0, "cogging"),  # what both leave may be of another shape of the curve
-        (1000.0, 6, 1010.0, "cogging"),  # nothing is left to ask about
-        (3000.0, 2, 1010.0, "cogging"),  # no curve of many numbers
+        (3000.0, 6, 1010.0, 4, "force_bias"),  # with a second it leaves nothing
+        (3000.0, 6, 1010.0, 7, "cogging"),  # the second is the same curve
+        (3000.0, 6, 2900.0, 4, "cogging"),  # what both leave may be of another shape of the curve
+        (1000.0, 6, 1010.0, 4, "cogging"),  # nothing is left to ask about
+        (3000.0, 2, 1010.0, 2, "cogging"),  # no curve of many numbers
     ],
 )
-def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_of_many(leaves, free, left, first):
+def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_of_many(leaves, free, left, both, first):
     before: Any = SimpleNamespace(chi2=20000.0, free=5)
 
     def trial(id: str, chi2: float, free: int) -> Any:
         return SimpleNamespace(id=id, fit=SimpleNamespace(chi2=chi2, free=5 + free), score=chi2)
 
     curve, plain = trial("cogging", leaves, free), trial("force_bias", 5000.0, 1)
-    second = trial("encoder_error", left, 4)
+    second = trial("encoder_error", left, both)
     asked: Any = object.__new__(Expecting)
     asked.prepared, asked.samples = SimpleNamespace(memory=1.0), 10000
     asked._near = lambda now, ranked: ranked[1:]
@@ -236,6 +237,20 @@ def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_o
         patch.setattr("bench.diagnose.search.believable", lambda *_: True)
         patch.setattr("bench.diagnose.search.least_gain", lambda *_: 0.0)
         assert asked._plain_first(path, [curve, plain])[0].id == first
+
+
+@pytest.mark.parametrize(("seeds", "least"), [(3, 3), pytest.param(10, 8, marks=pytest.mark.long)])
+def test_a_form_with_a_long_way_to_go_is_not_left_behind(seeds, least):
+    """Where two periods stand for a ripple of which a part goes with the load, each form is carried on for itself."""
+    found = []
+    for seed in range(seeds):
+        c = draw_case(seed, ("cogging",), 2.0, "current_sensors", protocol="staircase", rate_hz=150.0, jitter="none",
+                      noise_kind="white", noise_N=0.003, own_clock=False, law="exponential")  # fmt: skip
+        search, base = begun(c)
+        fit = search.recurved(search.ranked(base, only=["cogging"])[0].fit)
+        assert fit.chi2 < 1.2 * search.expected
+        found.append(fit.structure.causes[0].form.name)
+    assert found.count("unbalanced") >= least
 
 
 @pytest.mark.long
