@@ -24,6 +24,9 @@ value. Each is exact for a force that is linear between samples, at any spacing.
   throttle with a valve (Doebelin, chapter 6). A step that begins on one side of the force ends on it.
 - `loaded`: one pole of the time τ e^(growth (y/at_force − 1)), which goes with the force y that is there: air in a cell
   of oil gives way the less, the more it bears (H. E. Merritt, Hydraulic Control Systems, Wiley, 1967, section 1.3).
+- `warming`: one pole of the time τ e^(growth u + bend (3u² − 1)/2), u = t/at_time − 1, which goes with the time since
+  the first sample: oil thins as it warms (G. W. Stachowiak, A. W. Batchelor, Engineering Tribology, 4th ed.,
+  Butterworth-Heinemann, 2014, section 2.3). With at_time half the length of the data, τ is its geometric mean.
 
 Reference: E. O. Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 1990, chapter 3 (first
 and second order instruments and their response to a ramp); A. I. Zverev, Handbook of Filter Synthesis, Wiley, 1967
@@ -38,9 +41,11 @@ from collections.abc import Mapping
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.linear import first_order as lagged
 from sim.effects.linear import low_pass
+from sim.effects.stamps import HALF_TIME
 from sim.jit import State, block
 
 _Y, _LAST, _STARTED, _Y2, _V, _V2 = range(6)
+_SINCE = 3  # in place of a second output: time since the first sample
 
 
 @block
@@ -93,6 +98,22 @@ def loaded(dt: float, u: float, state: State, p: State) -> float:
         borne = min(max(state[_Y] / p[2], 0.0), 2.0)
         y = lagged(dt, state[_Y], state[_LAST], u, p[0] * math.exp(p[1] * (borne - 1.0)))
         state[_Y] = y
+    state[_LAST] = u
+    return state[_Y]
+
+
+@block
+def warming(dt: float, u: float, state: State, p: State) -> float:
+    """One pole, whose time goes with the time since the first sample; p = (time_constant, growth, bend, at_time)."""
+    if state[_STARTED] == 0.0 or p[0] <= 0.0:
+        state[_STARTED] = 1.0
+        state[_Y] = u
+    else:
+        middle = (state[_SINCE] + 0.5 * dt) / p[3] - 1.0
+        goes = p[1] * middle + p[2] * (1.5 * middle * middle - 0.5)
+        y = lagged(dt, state[_Y], state[_LAST], u, p[0] * math.exp(goes))
+        state[_Y] = y
+    state[_SINCE] += dt
     state[_LAST] = u
     return state[_Y]
 
@@ -423,6 +444,28 @@ EFFECT = Effect(
             sought=False,
             blocks={"sensor": loaded},
             state=(0.0,) * 3,
+        ),
+        Form(
+            name="warming",
+            what="one pole, quicker or slower as time goes by",
+            parameters=(
+                _TIME_CONSTANT,
+                Parameter(
+                    "growth",
+                    "1",
+                    -1.5,
+                    1.5,
+                    0.4,
+                    "of its logarithm, over half the data",
+                    default=0.0,
+                    starts=(-0.5, 0.5),
+                ),
+                Parameter("bend", "1", -1.0, 1.0, 0.2, "of its logarithm, at either end", default=0.0),
+                HALF_TIME,
+            ),
+            sought=False,
+            blocks={"sensor": warming},
+            state=(0.0,) * 4,
         ),
     ),
 )

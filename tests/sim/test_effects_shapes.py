@@ -371,6 +371,16 @@ def test_a_cell_with_air_is_quicker_under_load() -> None:
     assert_allclose(sense(loaded, t, np.full(t.size, 3.0)), 3.0)
 
 
+def test_oil_that_thins_as_it_warms() -> None:
+    """Small steps at the begin, in the middle and at the end: each ends as a lag of its own time does, or nearly."""
+    lag = active("sensor_lag", "warming", time_constant=0.02, growth=-0.4, bend=0.2, at_time=30.0)
+    for at, time in ((1e-9, math.exp(0.4 + 0.2)), (30.0, math.exp(-0.1)), (60.0, math.exp(-0.4 + 0.2))):
+        t = np.r_[np.linspace(0.0, at, 50), at + np.arange(1, 400) * 0.0005]
+        left = 1.0 - sense(lag, t, 1.0 * (t > at))[t > at]
+        assert_allclose(left[1:], left[0] * np.exp(-(t[t > at] - t[t > at][0])[1:] / (0.02 * time)), atol=0.01)
+    assert_allclose(sense(lag, t, np.full(t.size, 3.0)), 3.0)
+
+
 def test_relaxation_that_follows_the_depth_late() -> None:
     block = effect("depth_dependent_relaxation").form("late").blocks["rate"]
     t = np.arange(0.0, 3.0, 0.01)
