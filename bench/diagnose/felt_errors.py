@@ -3,7 +3,7 @@
 Friction that turns round within a micrometre, and a mass that feels the second derivative, make much of what is left
 of the encoder's noise, and of what smoothing has bent: no model can say more of the force than the positions do. It is
 found by moving the positions within their doubt, and running the model again. What scatters in when a force was felt
-(`late_by_chance`) is of the same kind.
+(`late_by_chance`), and when within a step it leaps (`within_a_step`), is of the same kind.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from .data import Data, FeltErrors, Prepared
 from .late_by_chance import force_rate, late_by_chance_s
 from .numbers import Structure
 from .refit import Fit, force_at
+from .within_a_step import leaps
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,9 @@ def felt_errors(prepared: Prepared, fit: Fit, errors_mm: Array) -> FeltErrors:
     counted = np.maximum(uniform_filter1d(data.weight, TOGETHER), 1e-12)
     beyond_N2 = uniform_filter1d(square, TOGETHER) / counted - prepared.noise.force_N**2
     own_N2 = np.minimum(own_N2, np.maximum(beyond_N2, 0.0))
+    at = prepared.at[data.weight[prepared.at] > 0.0]
+    known_N = np.sqrt(np.maximum(prepared.full.sigma_N**2 - prepared.felt.total_N**2, 0.0))
+    own_N2[at] = np.maximum(own_N2[at], leaps(modelled[at], data.force_N[at], known_N[at]) ** 2)
     least = (SEEN * prepared.noise.force_N) ** 2
     own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
     return FeltErrors(own_N, shared_N, stretch, late_s)
