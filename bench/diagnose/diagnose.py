@@ -23,14 +23,14 @@ from .candidates import CHANNEL
 from .channel import Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
-from .evidence import MOST_LEFT, SPEAKS, beyond_limit, its_own, of_slow_force
+from .evidence import MOST_LEFT, SPEAKS, beyond_limit, of_slow_force, within_bounds
 from .held_out import SEEN, held_out_square, later_square
 from .hum import Line
 from .hum import find as line_of
 from .modes import missing_told
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
-from .refit import Fit, extended, force_at, last, mean_square, onto, placed, refit
+from .refit import Fit, extended, force_at, mean_square, onto, placed, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
 from .search import Search
@@ -91,7 +91,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     floor = _floor(prepared, final)
     fits, squares, excess = _needed(prepared, path, final, floor)
     whole = _whole(prepared, fits, search.believed)
-    while (gone := _gone(prepared, fits, whole[1], excess)) is not None:
+    while (gone := _gone(fits, whole[1], excess)) is not None:
         fits, squares, excess = _dropped(prepared, path, fits, gone, floor)
         whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
@@ -244,9 +244,9 @@ def _retimed(prepared: Prepared, fit: Fit, mains: Line) -> Line:
     return line if line is not None and near and line.of_the_mains else mains
 
 
-def _gone(prepared: Prepared, fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
+def _gone(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     """Number of a cause that is none once all is fitted together; None: all are."""
-    for number in (_faded(fits, whole), _untold(fits, whole, excess), _anothers(prepared, fits, whole, excess)):
+    for number in (_faded(fits, whole), _untold(fits, whole, excess), _anothers(fits, whole, excess)):
         if number is not None:
             return number
     return None
@@ -274,15 +274,15 @@ def _untold(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     return None
 
 
-def _anothers(prepared: Prepared, fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
+def _anothers(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     """Number of a further cause that takes little and is another's limit: it has a number at its bound, or does nothing
     but split the steps in which the others are worked out; None: there is none."""
-    own = len(fits[0].structure.causes)
+    own, values = len(fits[0].structure.causes), whole.structure.values(whole.x)
     for k in range(len(fits) - 1, 1, -1):
         index = own + k - 1
-        alone = last(whole, whole.structure.causes[index].id)
-        nothing = no_size(whole, index) or not its_own(alone, prepared)
-        if nothing and excess[k - 1] - excess[k] < LITTLE * excess[0]:
+        cause = whole.structure.causes[index]
+        at_a_bound = cause.amplitude is not None and not within_bounds(cause, values[index])  # a law is one anywhere
+        if (at_a_bound or no_size(whole, index)) and excess[k - 1] - excess[k] < LITTLE * excess[0]:
             return k - 1
     return None
 

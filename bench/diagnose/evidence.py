@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from sim.effects.base import Parameter
 
 from .channel import FAR
 from .data import Data, Prepared
+from .numbers import Cause
 from .refit import Fit, errors, force_at, reduced
 
 Mask = NDArray[np.bool_]
@@ -155,13 +157,13 @@ def _ends(fit: Fit, prepared: Prepared) -> bool:
 
 def believable(fit: Fit, prepared: Prepared) -> bool:
     """Whether the last cause's numbers are beyond what such data could show at all, and its own."""
-    return its_own(fit, prepared) and not _small(fit, prepared)
+    return _own(fit, prepared) and not _small(fit, prepared)
 
 
 def too_small(fit: Fit, prepared: Prepared) -> bool:
     """Whether all that speaks against the last cause is that such data could not show so little: it is not named, but
     neither is it excluded."""
-    return its_own(fit, prepared) and _small(fit, prepared)
+    return _own(fit, prepared) and _small(fit, prepared)
 
 
 def _small(fit: Fit, prepared: Prepared) -> bool:
@@ -182,15 +184,20 @@ def _small(fit: Fit, prepared: Prepared) -> bool:
     return any(abs(values[name]) < share * limits[of] for name, (of, share) in floors)
 
 
-def its_own(fit: Fit, prepared: Prepared) -> bool:
+def _own(fit: Fit, prepared: Prepared) -> bool:
     """Whether the last cause is clear of its bounds: there it is another's limit, as a wave longer than the data is, a
     pull of any reach, or a mode so damped that it is a lag. (Another law is one at any of its numbers.)"""
     cause = fit.structure.causes[-1]
     values = fit.structure.values(fit.x)[-1]
     if cause.id == "saturation" and not _ends(fit, prepared):
         return False
+    return cause.form.amend is not None or within_bounds(cause, values)
+
+
+def within_bounds(cause: Cause, values: Mapping[str, float]) -> bool:
+    """Whether the numbers that the contract asks for, but for the size, are clear of the bounds of what is sought."""
     told = [p for p in cause.form.parameters if p.required and not (p.fixed or p.amplitude)]
-    return cause.form.amend is not None or all(_inside(p, values[p.name]) for p in told)
+    return all(_inside(p, values[p.name]) for p in told)
 
 
 def beyond_limit(data: Data, fit: Fit) -> Mask:
