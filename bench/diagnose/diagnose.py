@@ -49,6 +49,7 @@ TOLD = 0.002  # of the noise power
 LEAST, FURTHER = 0.004, 0.01  # of the error beyond the noise: what a first and a further cause must take of what was
 # held out
 DOUBTED, LITTLE = 0.3, 0.08  # sure of a name, and of the error beyond the noise: a further cause with less is none
+UNLIKELY, A_FIFTH = 0.2, 0.2  # the same, with less of it
 NAMED, TRACE = 0.6, 0.05  # the same, of a further cause where what it and all others leave is next to nothing
 FAINT = 0.25  # of the noise power, that such a cause takes
 OF_A_GIANT, NO_LESS = 0.003, 2.0  # of the error beyond the noise, and of what is left: for the shape of the first
@@ -182,9 +183,9 @@ def _doubtful(
     path: Path, fits: list[Fit], excess: list[float], apart: float, floor_N: float, slow: list[float]
 ) -> int | None:
     """Number of a further cause whose name is hardly sure, and that takes little, and less than is left: what left the
-    one may have left the other. Or of one that takes next to nothing, and far less than the noise, under a name that
-    may be another, where the rest is as good as explained without it: no shape is exact, and what it misses looks like
-    something."""
+    one may have left the other. Or whose name is most likely another, and that takes no large part. Or of one that
+    takes next to nothing, and far less than the noise, under a name that may be another, where the rest is as good as
+    explained without it: no shape is exact, and what it misses looks like something."""
     named = [c.id for c in fits[-1].structure.causes[len(fits[0].structure.causes) :]]
     for k in range(len(fits) - 1, 1, -1):
         _, confidence, kind = sureness(path, named[k - 1], named)
@@ -192,6 +193,8 @@ def _doubtful(
         if sure < DOUBTED and _takes_little(excess, k, excess[0] + apart, slow[k - 1]):
             return k - 1
         taken, trace = excess[k - 1] - excess[k], TRACE * excess[0]
+        if sure < UNLIKELY and taken < A_FIFTH * (excess[0] + apart):
+            return k - 1
         if sure < NAMED and taken < min(trace, FAINT * floor_N**2) and taken + excess[-1] < 2.0 * trace:
             return k - 1
         if sure < DOUBTED and taken < min(OF_A_GIANT * excess[0], NO_LESS * excess[-1]):

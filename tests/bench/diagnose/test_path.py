@@ -247,6 +247,8 @@ def test_where_no_test_sees_structure_a_little_over_the_noise_is_noise():
         ([9500.0, 28.0, 10.0], 0.4, None),  # the name may be right
         ([9500.0, 28.0, 5.0], 0.2, None),  # it leaves little of that
         ([4000.0, 28.0, 10.0], 0.2, None),  # it is no giant's
+        ([4.0, 0.6, 0.0], 0.15, 1),  # most likely it is another
+        ([4.0, 1.0, 0.0], 0.15, None),  # but something it must be
     ],
 )
 def test_a_further_cause_that_takes_next_to_nothing_under_an_unsure_name_goes(monkeypatch, excess, sure, goes):
