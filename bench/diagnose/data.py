@@ -192,9 +192,13 @@ class Prepared:
 
     def doubting(self, felt: FeltErrors) -> Prepared:
         """With other such errors than before."""
-        sigma = np.sqrt(np.maximum(self.full.sigma_N**2 - self.felt.total_N**2, 0.0) + felt.total_N**2)
-        full = replace(self.full, sigma_N=sigma)
+        full = replace(self.full, sigma_N=np.hypot(self.without_felt_N, felt.total_N))
         return replace(self, full=full, short=_averaged(full, self.owner), felt=felt)
+
+    @property
+    def without_felt_N(self) -> Array:
+        """Standard deviation of one force sample by itself (full.size,), N, but for what such errors make."""
+        return np.asarray(np.sqrt(np.maximum(self.full.sigma_N**2 - self.felt.total_N**2, 0.0)))
 
     @cached_property
     def judged(self) -> Data:

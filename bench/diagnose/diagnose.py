@@ -147,17 +147,17 @@ def _needless(
     own = len(fits[0].structure.causes)
     floor = squares[-1] - excess[-1]
     scale = excess[0] + apart
-    end = len(fits) - 2
-    order = sorted(range(end + 1), key=lambda k: squares[k] - squares[k + 1])
+    last = len(fits) - 2
+    order = sorted(range(last + 1), key=lambda k: squares[k] - squares[k + 1])
     for k in order:
         taken, gain, left = squares[k] - squares[k + 1], excess[k] - excess[k + 1], excess[k]
-        if k < end and gain <= FURTHER * scale and squares[k + 1] <= HARM * squares[k]:
+        if k < last and gain <= FURTHER * scale and squares[k + 1] <= HARM * squares[k]:
             # of two that hide each other neither is of use alone; but neither does it harm
             alone = held_out_square(prepared, without(prepared, fits[-1], own + k))
             taken, gain, left = alone - squares[-1], max(alone - floor, 0.0) - excess[-1], max(alone - floor, 0.0)
         if taken <= 0.0:
             return k
-        small = gain <= (LEAST if end == 0 else FURTHER) * scale
+        small = gain <= (LEAST if last == 0 else FURTHER) * scale
         most_left = k < 2 and gain >= MOST_LEFT * (left - slow[k]) and gain >= SPEAKS * prepared.floor_N**2
         if small and not most_left:
             return k
@@ -170,9 +170,9 @@ def _needless(
     causes = fits[-1].structure.causes[own:]
     drifts = [c.id == "force_drift" and excess[k] - excess[k + 1] > NEARLY_ALL * scale for k, c in enumerate(causes)]
     rest = [
-        np.inf if drifts[k] else later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(end + 1)
+        np.inf if drifts[k] else later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(last + 1)
     ]
-    for k in range(end + 1):  # what it takes of all that was held out may be more than it does harm to the end alone
+    for k in range(last + 1):  # what it takes of all that was held out may be more than it does harm to the end alone
         if excess[k + 1] < MOST * excess[k] and squares[k] - squares[k + 1] > (1.0 - SEEN) * (later - rest[k]):
             rest[k] = np.inf
     best = int(np.argmin(rest))
@@ -219,14 +219,14 @@ def _floor(prepared: Prepared, final: Fit) -> float:
 def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fit, Fit]:
     """First and last fit carried to the end on all the data, with the hum that the last one then has to make."""
     full, data, mains = prepared.full, prepared.full, prepared.mains
-    before, all_found = onto(fits[0], full, 6, 1e-8), replace(fits[-1], x=missing_told(fits[-1], believed))
+    before, last = onto(fits[0], full, 6, 1e-8), replace(fits[-1], x=missing_told(fits[-1], believed))
     if mains is None:
-        after = onto(all_found, full, 6, 1e-8)
+        after = onto(last, full, 6, 1e-8)
     else:
-        data, structure = prepared.raw, all_found.structure.with_cause(hum_cause(_retimed(prepared, all_found, mains)))
+        data, structure = prepared.raw, last.structure.with_cause(hum_cause(_retimed(prepared, last, mains)))
         hum = structure.of_cause(len(structure.causes) - 1)
-        own = structure.x(all_found.x[: len(structure.pad.coordinates)], None)[hum]
-        after = refit(data, structure, extended(all_found, own), 8, 1e-8)
+        own = structure.x(last.x[: len(structure.pad.coordinates)], None)[hum]
+        after = refit(data, structure, extended(last, own), 8, 1e-8)
     after = _spread(prepared, data, after)
     if prepared.felt.total_N.any():
         before, after = placed(full, before), placed(data, after)

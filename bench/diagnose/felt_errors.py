@@ -65,8 +65,8 @@ def felt_errors(prepared: Prepared, fit: Fit, errors_mm: Array) -> FeltErrors:
     beyond_N2 = uniform_filter1d(square, TOGETHER) / counted - prepared.noise.force_N**2
     own_N2 = np.minimum(own_N2, np.maximum(beyond_N2, 0.0))
     at = prepared.at[data.weight[prepared.at] > 0.0]
-    known_N = np.sqrt(np.maximum(prepared.full.sigma_N**2 - prepared.felt.total_N**2, 0.0))
-    own_N2[at] = np.maximum(own_N2[at], leaps(modelled[at], data.force_N[at], known_N[at]) ** 2)
+    leapt_N = leaps(modelled[at], data.force_N[at], prepared.without_felt_N[at])
+    own_N2[at] = np.maximum(own_N2[at], leapt_N**2)
     least = (SEEN * prepared.noise.force_N) ** 2
     own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
     return FeltErrors(own_N, shared_N, stretch, late_s)

@@ -34,7 +34,7 @@ def late_by_chance_s(prepared: Prepared, fit: Fit) -> float:
         return 0.0
     modelled = force_at(full, fit.structure, fit.x)
     left, rate = (full.force_N - modelled)[at], np.abs(force_rate(full, modelled))[at]
-    known_N = np.sqrt(np.maximum(full.sigma_N**2 - prepared.felt.total_N**2, 0.0))[at]
+    known_N = prepared.without_felt_N[at]
     lefts, rates, times, knowns = (
         np.lib.stride_tricks.sliding_window_view(values, len(WEIGHTS))
         for values in (left, rate, full.time_s[at], known_N)
