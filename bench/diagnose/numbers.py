@@ -31,6 +31,8 @@ class Coordinate:
     upper: float
     logarithmic: bool = False
     unit: float = 1.0
+    cost: float = 0.0
+    """What its square costs, in χ²: of what is expected to be near 0 before any data."""
 
     def value(self, x: float) -> float:
         """The number itself."""
@@ -153,7 +155,8 @@ def _coordinate(p: Parameter) -> Coordinate:
     if p.logarithmic:
         return Coordinate(p.name, float(np.log(p.lower)), float(np.log(p.upper)), True)
     unit = abs(p.typical) or (p.upper - p.lower) / 10 or 1.0
-    return Coordinate(p.name, p.lower / unit, p.upper / unit, unit=unit)
+    cost = 0.0 if p.spread is None else (unit / p.spread) ** 2
+    return Coordinate(p.name, p.lower / unit, p.upper / unit, unit=unit, cost=cost)
 
 
 @dataclass(frozen=True)
@@ -173,9 +176,9 @@ class Structure:
     def __post_init__(self) -> None:
         found = [*self.pad.coordinates, *(_coordinate(p) for c in self.causes for p in c.fitted)]
         if self.doubt_mm > 0:
-            found.append(Coordinate("surface", -6.0, 6.0, unit=self.doubt_mm))
+            found.append(Coordinate("surface", -6.0, 6.0, unit=self.doubt_mm, cost=1.0))
         if self.zero_N > 0:
-            found.append(Coordinate("zero", -4.0, 4.0, unit=self.zero_N))
+            found.append(Coordinate("zero", -4.0, 4.0, unit=self.zero_N, cost=1.0))
         object.__setattr__(self, "coordinates", tuple(found))
 
     @cached_property
@@ -190,10 +193,8 @@ class Structure:
 
     @property
     def prior(self) -> Array:
-        """What each coordinate squared costs, in χ²: the doubts about surface and zero."""
-        prior = np.zeros(len(self.coordinates))
-        prior[len(prior) - self.tail :] = 1.0
-        return prior
+        """What each coordinate squared costs, in χ²: the doubts about surface and zero, and what is expected."""
+        return np.array([c.cost for c in self.coordinates])
 
     @property
     def tail(self) -> int:

@@ -71,6 +71,10 @@ class Parameter:
     """A depth at which the force bends. Each depth held before or behind it makes a minimum of its own, so a fit starts
     from many shares of the depth reached, and not from `starts`."""
 
+    spread: float | None = None
+    """Standard deviation about 0 that is expected of it before any data: of numbers, as those of a course in time, of
+    which data may tell some sums alone."""
+
     def __post_init__(self) -> None:
         outside = [value for value in (*self.starts, self.if_left_out) if not self.lower <= value <= self.upper]
         if outside:

@@ -143,7 +143,7 @@ EFFECT = Effect(
             what="now faster and now slower apart",
             parameters=(
                 _SKEW,
-                *half_waves(_WAVES, 3.0, "of the rate over the data, over `skew`"),
+                *half_waves(_WAVES, 0.5, "of the rate over the data, over `skew`"),
                 HALF_TIME,
             ),
             time_shift=wandering,

@@ -62,7 +62,7 @@ EFFECT = Effect(
             what="now more and now less, as a network's",
             parameters=(
                 _DELAY,
-                *half_waves(_WAVES, 0.6, "over the data, over `delay`"),
+                *half_waves(_WAVES, 0.25, "over the data, over `delay`"),
                 HALF_TIME,
             ),
             time_shift=wandering,

@@ -9,9 +9,14 @@ AT_TIME = Parameter("at_time", "s", 0.0, 1e6, 30.0, "time since the first sample
 HALF_TIME = Parameter("at_time", "s", 0.0, 1e6, 30.0, "half the length of the data", fixed=True)
 
 
-def half_waves(count: int, most: float, what: str) -> tuple[Parameter, ...]:
-    """Of what is now more and now less over the data: how far by each of so many half waves, of itself."""
-    return tuple(Parameter(f"wave_{k}", "1", -most, most, 0.0, f"{k} half waves {what}") for k in range(1, count + 1))
+def half_waves(count: int, spread: float, what: str) -> tuple[Parameter, ...]:
+    """Of what is now more and now less over the data: how far by each of so many half waves, of itself. By about
+    `spread` as is expected: where few moves tell of it, it is not known in between."""
+    most = 6.0 * spread
+    return tuple(
+        Parameter(f"wave_{k}", "1", -most, most, 0.0, f"{k} half waves {what}", spread=spread)
+        for k in range(1, count + 1)
+    )
 
 
 def origin(stamp_s: Array) -> float:
