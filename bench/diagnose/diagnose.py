@@ -284,7 +284,8 @@ def _anothers(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     for k in range(len(fits) - 1, 1, -1):
         index = own + k - 1
         cause = whole.structure.causes[index]
-        at_a_bound = cause.amplitude is not None and not within_bounds(cause, values[index])  # a law is one anywhere
+        law = cause.form.amend is not None and cause.amplitude is None  # it is one at any of its numbers
+        at_a_bound = not law and not within_bounds(cause, values[index])
         if (at_a_bound or no_size(whole, index)) and excess[k - 1] - excess[k] < LITTLE * excess[0]:
             return k - 1
     return None
