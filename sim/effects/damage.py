@@ -15,6 +15,10 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   does no harm (Lemaitre's p_D). A stroke down to `reach` costs as much as elsewhere.
 - `fatigue`: as `power`, in the travel weighed as in `energy`: what a crack does whose growth goes with a power of the
   stroke (Paris), the faster the longer it is (k below 0).
+- `loss`: e^(−rate · s ∫ ν (u − z)² dt), z' = ν (u − z), u = (δ/s)^n, ν = 1/time_constant: by what a pad dissipates as
+  it relaxes, in holds too (W. van Dijk, Practical fatigue characterization of bituminous mixes, Proc. Assoc. Asphalt
+  Paving Technol. 44, 1975, 38–74). A stroke down to s, two thirds of `reach`, held there and after it for long, costs
+  as much as elsewhere: among strokes of all depths those are about the mean.
 
 `rate` is what a mm of travel takes at first, of the stiffness.
 
@@ -26,12 +30,16 @@ propagation laws, J. Basic Eng. 85, 1963.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block, compiled
 
 _LAST, _TRAVEL = range(2)
+_MODE, _LOST = range(2)
 _LEAST = 0.02
+_MEAN_STROKE = 2.0 / 3.0
+"""Of `reach`: what `rate` of `loss` is stated for."""
 
 
 @compiled("UniTuple(float64, 2)(float64, float64, float64, float64)")
@@ -111,6 +119,19 @@ def fatigue(dt: float, depth: float, state: State, p: State) -> float:
 
 
 @block
+def loss(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, exponent, time_constant, reach); state: what the relaxing mode remembers, ∫ ν (u − z)²
+    dt."""
+    stroke = _MEAN_STROKE * p[3]
+    u = (depth / stroke) ** p[1] if depth > 0.0 else 0.0
+    fades = math.exp(-dt / p[2])
+    behind = u - state[_MODE]
+    state[_MODE] = u - behind * fades
+    state[_LOST] += 0.5 * behind * behind * (1.0 - fades * fades)
+    return math.exp(-p[0] * stroke * state[_LOST])
+
+
+@block
 def threshold(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, spared, reach, dead_band)."""
     limit = p[1] * p[2]
@@ -185,6 +206,19 @@ EFFECT = Effect(
             parameters=(_RATE, _EXPONENT, _POWER, _REACH, _DEAD_BAND),
             sought=False,
             blocks={"elastic": fatigue},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="loss",
+            what="with what the pad dissipates as it relaxes",
+            parameters=(
+                _RATE,
+                replace(_EXPONENT, lower=0.3, what="power of depth with which the load goes"),
+                Parameter("time_constant", "s", 1e-3, 1e3, 1.0, "within which it relaxes", starts=(0.1, 1.0, 10.0)),
+                _REACH,
+            ),
+            sought=False,
+            blocks={"elastic": loss},
             state=(0.0, 0.0),
         ),
         Form(

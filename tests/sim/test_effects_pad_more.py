@@ -234,6 +234,20 @@ class TestWhatGoesOnByItself:
         assert_allclose(force, 0.1 * (1.5 - 0.25 * deepest) * np.sin(2 * np.pi * x / 0.7 + 0.3), atol=1e-9)
 
 
+def test_what_relaxes_is_lost_in_holds_too() -> None:
+    """A step down to two thirds of `reach` and one back, each held: together as a mm of travel is said to cost. A mode
+    that has no time to relax costs nothing, however far it goes."""
+    t = np.concatenate([np.arange(0.0, 8.0, 0.002), 8.0 + np.arange(0.0, 8.0, 0.002), [16.0]])
+    x = np.where((t >= 1.0) & (t < 8.0), 2.0, -0.1)
+    x[-1] = 2.0
+    numbers = {"rate": 0.1, "exponent": 1.7, "time_constant": 0.5, "reach": 3.0}
+    force = simulate(LINEAR, [active("damage", "loss", **numbers)], t, x)
+    assert_allclose(force[t == 7.0], 2.0 * K * math.exp(-0.1), rtol=1e-4)  # half of 2 mm · 0.1/mm
+    assert_allclose(force[-1], 2.0 * K * math.exp(-0.2), rtol=5e-3)
+    quick = active("damage", "loss", **(numbers | {"time_constant": 500.0}))
+    assert_allclose(simulate(LINEAR, [quick], t, x)[t == 7.0], 2.0 * K, rtol=5e-3)
+
+
 def test_fatigue_goes_with_a_power_of_the_stroke_and_faster_the_weaker_the_pad_is() -> None:
     """Of two strokes to 1 mm, one to half of it between: with the cube of the depth, and d(s²) constant in that."""
     strokes = [ramp(1.0, 501), ramp(0.5, 501)[1:], ramp(1.0, 501)[1:]]

@@ -256,6 +256,18 @@ def test_a_form_with_a_long_way_to_go_is_not_left_behind(id, shape, form, seeds,
     assert sum(found) >= least
 
 
+@pytest.mark.parametrize("seed", [0, 5, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2, 3, 4, 6, 7))])
+def test_damage_by_what_is_dissipated_is_no_other_damage(seed):
+    """It goes on in holds, which no travel does; another form leaves some times as much."""
+    c = draw_case(seed, ("damage",), 2.0, "by_loss", protocol="random_steps", rate_hz=150.0, jitter="none",
+                  noise_kind="white", noise_N=0.005, own_clock=False, law="exponential")  # fmt: skip
+    search, base = begun(c)
+    other = search.ranked(base, only=["damage"])[0].fit
+    loss = search.recurved(other)
+    assert loss.structure.causes[0].form.name == "loss"
+    assert loss.chi2 - search.expected < 0.5 * (other.chi2 - search.expected)
+
+
 @pytest.mark.parametrize("seed", [21, 29, *(pytest.param(s, marks=pytest.mark.long) for s in (24, 25, 32, 35))])
 def test_a_course_in_time_that_few_moves_tell_of_is_one_all_the_same(seed):
     """Between the moves its waves go as far as they may, but for what is expected of them. (Of seeds 0 to 39, those in
