@@ -278,15 +278,15 @@ def _untold(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
 
 
 def _anothers(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
-    """Number of a further cause that takes little and is another's limit: it has a number at its bound, or does nothing
-    but split the steps in which the others are worked out; None: there is none."""
+    """Number of a cause that does nothing, but split the steps in which others are worked out or stand for noise; or of
+    a further one that takes little and is another's limit, with a number at its bound; None: there is none."""
     own, values = len(fits[0].structure.causes), whole.structure.values(whole.x)
-    for k in range(len(fits) - 1, 1, -1):
+    for k in range(len(fits) - 1, 0, -1):
         index = own + k - 1
         cause = whole.structure.causes[index]
         law = cause.form.amend is not None and cause.amplitude is None  # it is one at any of its numbers
-        at_a_bound = not law and not within_bounds(cause, values[index])
-        if (at_a_bound or no_size(whole, index)) and excess[k - 1] - excess[k] < LITTLE * excess[0]:
+        little = k > 1 and excess[k - 1] - excess[k] < LITTLE * excess[0]
+        if no_size(whole, index) or (little and not law and not within_bounds(cause, values[index])):
             return k - 1
     return None
 

@@ -194,12 +194,12 @@ def told_size(final: Fit, index: int) -> float:
 
 
 def no_size(final: Fit, index: int) -> bool:
-    """Whether a fit's cause does nothing: its size is far within its own deviation."""
+    """Whether a fit's cause does nothing: its size is nothing, or far within its own deviation."""
     size, numbers = final.structure.causes[index].amplitude, described(final, index)[2]
     if size is None or size.fixed or size.name not in numbers:
         return False
     number = numbers[size.name]
-    return abs(number.value) < NOTHING * number.std
+    return number.value == 0.0 or abs(number.value) < NOTHING * number.std
 
 
 def _of_its_size(cause: Cause, numbers: Mapping[str, Number]) -> float:

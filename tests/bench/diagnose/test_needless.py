@@ -145,12 +145,15 @@ def test_a_further_cause_without_a_size_goes_where_it_takes_little(monkeypatch, 
         ([False, True], [True, True], [1.0, 0.001, 0.0], 1),
         ([False, False], [True, False], [1.0, 0.001, 0.0], 1),
         ([False, False], [True, True], [1.0, 0.001, 0.0], None),
-        ([False, True], [True, False], [1.0, 0.3, 0.0], None),
-        ([True, False], [False, True], [1.0, 0.001, 0.0], None),
+        ([False, False], [True, False], [1.0, 0.3, 0.0], None),
+        ([False, False], [False, True], [1.0, 0.001, 0.0], None),
+        ([True, False], [True, True], [1.0, 0.0, 0.0], 0),
     ],
-    ids=["does nothing", "at its bound", "a cause", "takes much", "the first stays"],
+    ids=["does nothing", "at its bound", "a cause", "takes much", "the first stays", "the first does nothing"],
 )
-def test_a_further_cause_that_is_anothers_limit_goes_where_it_takes_little(monkeypatch, nothing, within, excess, gone):
+def test_a_cause_that_does_nothing_goes_and_a_further_one_that_is_anothers_limit(
+    monkeypatch, nothing, within, excess, gone
+):
     """A mode as fast as the sampling beside a lag; a skew of nothing beside a film that tears within a step."""
     causes = tuple(SimpleNamespace(number=k, amplitude=None, form=SimpleNamespace(amend=None)) for k in range(2))
     monkeypatch.setattr(module, "no_size", lambda whole, index: nothing[index])
@@ -159,4 +162,4 @@ def test_a_further_cause_that_is_anothers_limit_goes_where_it_takes_little(monke
     fits: list[Any] = [SimpleNamespace(structure=SimpleNamespace(causes=causes[:k])) for k in range(3)]
     assert module._anothers(fits, whole, excess) == gone
     causes[1].form.amend = object()  # a law is one at any of its numbers
-    assert module._anothers(fits, whole, excess) == (gone if nothing[1] else None)
+    assert module._anothers(fits, whole, excess) == (gone if any(nothing) else None)
