@@ -170,7 +170,7 @@ class Search(Sieve):
         now, best = path.fits[-1], turn.ranked[0]
         other = self.recurved(now) if again else now
         same = other is not now and now.chi2 - other.chi2 > SAME * (now.chi2 - best.fit.chi2)
-        if not turn.found.pays and now.chi2 - other.chi2 > A_SHAPE * (now.chi2 - self.expected):
+        if not turn.found.pays and now.chi2 - other.chi2 > A_SHAPE * max(now.chi2 - self.expected, 0.0):
             return other  # what its old shape missed may have hidden what comes next
         if turn.found.pays or same:
             shaped = self._in_shape(now, turn.ranked, len(path.fits) == 1, same)

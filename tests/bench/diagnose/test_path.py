@@ -174,6 +174,14 @@ def test_another_shape_of_the_first_is_taken_before_it_is_said_that_no_second_pa
     assert named(Told(ranks, None, {20e3: 19e3})) == ["cogging"]  # of what is left a twentieth is no shape
 
 
+def test_where_nothing_is_left_a_search_ends():
+    """With less than the noise should leave no shape is another."""
+    search = Told({(): {"cogging": 900.0}, ("cogging",): {"force_bias": 899.0}}, None, {})
+    turns = []
+    search._turn = lambda path: turns.append(1) or Search._turn(search, path)  # type: ignore[method-assign,func-returns-value]
+    assert named(search) == ["cogging"] and len(turns) == 2
+
+
 class Reshaping(Told):
     """A search in which friction, but for what stood behind it, is tried with the resonance in another shape too."""
 
