@@ -312,7 +312,7 @@ def starts(
     """The most promising starts of a form, best first. `near`: numbers of another form of the family that was found,
     about which frequencies are sought."""
     cause = cause_of(effect, form)
-    if form.amend is not None and cause.amplitude is None:
+    if cause.of_the_law:
         amended = _amended(signatures.fit, cause)
         if len(amended) > most:
             amended = sorted(amended, key=lambda c: -signatures.whole(c))

@@ -28,7 +28,7 @@ from .held_out import SEEN, held_out_square, later_square
 from .hum import Line
 from .hum import find as line_of
 from .modes import missing_told
-from .numbers import PadNumbers, Structure, cause_of
+from .numbers import PadNumbers, Structure, cause_of, shapes_of
 from .path import Path
 from .refit import Fit, extended, force_at, mean_square, onto, placed, refit
 from .remains import remains
@@ -111,7 +111,7 @@ def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple
 
     fits = chain(prepared, final, base, path.fits)
     squares, excess = excesses(prepared, fits, floor_N)
-    shapes, as_found = ({(c.id, c.form.name) for c in fit.structure.causes} for fit in (final, plain))
+    shapes, as_found = (set(shapes_of(fit.structure)) for fit in (final, plain))
     untried = shapes != as_found
     while len(fits) > 1 and (number := needless(fits, squares, excess)) is not None:
         if untried:  # it may be the shape that does harm, and not the cause
@@ -284,9 +284,8 @@ def _anothers(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     for k in range(len(fits) - 1, 0, -1):
         index = own + k - 1
         cause = whole.structure.causes[index]
-        law = cause.form.amend is not None and cause.amplitude is None  # it is one at any of its numbers
         little = k > 1 and excess[k - 1] - excess[k] < LITTLE * excess[0]
-        if no_size(whole, index) or (little and not law and not within_bounds(cause, values[index])):
+        if no_size(whole, index) or (little and not cause.of_the_law and not within_bounds(cause, values[index])):
             return k - 1
     return None
 

@@ -140,6 +140,11 @@ class Cause:
         """The number that switches the effect off."""
         return next((p for p in self.form.parameters if p.amplitude), None)
 
+    @property
+    def of_the_law(self) -> bool:
+        """Whether it is another pad, as another law is: no number switches it off, it is one at any of them."""
+        return self.form.amend is not None and self.amplitude is None
+
     def with_start(self, **values: float) -> Cause:
         """Other values to start from."""
         return replace(self, start={**self.start, **values})
@@ -149,6 +154,11 @@ def cause_of(effect: Effect, form: Form, given: Mapping[str, float] | None = Non
     """With every parameter at its default, but for those given."""
     start = {p.name: p.if_left_out for p in form.parameters}
     return Cause(effect, form, start | dict(given or {}))
+
+
+def shapes_of(structure: Structure) -> list[tuple[str, str]]:
+    """Of each cause, its id and the name of its form."""
+    return [(cause.id, cause.form.name) for cause in structure.causes]
 
 
 def _coordinate(p: Parameter) -> Coordinate:

@@ -29,7 +29,7 @@ from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
 from .felt_errors import felt_errors, redrawn
 from .late_by_chance import late_by_chance_s
-from .numbers import Cause, cause_of
+from .numbers import Cause, cause_of, shapes_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
@@ -183,7 +183,7 @@ class Search(Sieve):
         if turn.ranked[0] is not best:
             best = turn.ranked[0]
             turn.found = self._lead(path, best)
-            if again and _shapes(path.fits[-1]) != _shapes(now):
+            if again and shapes_of(path.fits[-1].structure) != shapes_of(now.structure):
                 return path.fits[-1]  # those further behind stand beside another shape too
             now = path.fits[-1]
         if turn.beside is not None and self._reshaped(now.chi2, best.fit.chi2, turn.beside.fit.chi2):
@@ -413,8 +413,7 @@ class Search(Sieve):
             best = {(t.id, t.cause.form.name): t for t in sorted(first, key=lambda t: -t.score)}
             tried = list(pool.map(lambda t: self._carried(t, MORE), best.values()))
         near = [t for t in tried if not departed(t.fit, len(t.fit.structure.causes) - 1)]
-        of_a_form = {(t.id, t.cause.form.name): t for t in sorted(near, key=lambda t: -t.score)}
-        fits = [self._carried(t, ALL).fit for t in sorted(of_a_form.values(), key=lambda t: t.score)[:2]]
+        fits = [self._carried(t, ALL).fit for t in sorted(near, key=lambda t: t.score)[:2]]
         others = [fit for fit in fits if not departed(fit, len(fit.structure.causes) - 1)]
         return min([now, *others], key=lambda fit: fit.chi2)
 
@@ -485,7 +484,3 @@ class Search(Sieve):
     def _to_beat(self, fit: Fit) -> float:
         """The score below which another fit is better by more than what both leave."""
         return fit.chi2 + self._penalty(fit) - BETTER * max(fit.chi2 / self.expected, 1.0)
-
-
-def _shapes(fit: Fit) -> list[tuple[str, str]]:
-    return [(cause.id, cause.form.name) for cause in fit.structure.causes]

@@ -11,7 +11,7 @@ from .data import Prepared
 from .evidence import CRUMB, RIVAL, tempered, unexplained
 from .held_out import held_out_square
 from .late import LATE
-from .numbers import Cause
+from .numbers import Cause, shapes_of
 from .path import Measure, Path, Trial
 from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
@@ -47,9 +47,9 @@ def without(prepared: Prepared, fit: Fit, index: int, known: Sequence[Fit] = (),
     """The fit without one of its causes. `known`: fits of before: from one of the same causes in the same shapes it may
     be better, for what stood beside a cause can have led it far from where it is alone."""
     structure, x = reduced(fit, index)
-    shapes = [(c.id, c.form.name) for c in structure.causes]
+    shapes = shapes_of(structure)
     begun = [(structure, x)]
-    begun += [(f.structure, f.x) for f in known if [(c.id, c.form.name) for c in f.structure.causes] == shapes]
+    begun += [(f.structure, f.x) for f in known if shapes_of(f.structure) == shapes]
     return min((refit(prepared.short, s, at, steps, 1e-8) for s, at in begun), key=lambda f: f.chi2)
 
 

@@ -155,11 +155,11 @@ def test_a_cause_that_does_nothing_goes_and_a_further_one_that_is_anothers_limit
     monkeypatch, nothing, within, excess, gone
 ):
     """A mode as fast as the sampling beside a lag; a skew of nothing beside a film that tears within a step."""
-    causes = tuple(SimpleNamespace(number=k, amplitude=None, form=SimpleNamespace(amend=None)) for k in range(2))
+    causes = tuple(SimpleNamespace(number=k, of_the_law=False) for k in range(2))
     monkeypatch.setattr(module, "no_size", lambda whole, index: nothing[index])
     monkeypatch.setattr(module, "within_bounds", lambda cause, values: within[cause.number])
     whole: Any = SimpleNamespace(structure=SimpleNamespace(causes=causes, values=lambda x: [{}, {}]), x=None)
     fits: list[Any] = [SimpleNamespace(structure=SimpleNamespace(causes=causes[:k])) for k in range(3)]
     assert module._anothers(fits, whole, excess) == gone
-    causes[1].form.amend = object()  # a law is one at any of its numbers
+    causes[1].of_the_law = True  # it is one at any of its numbers
     assert module._anothers(fits, whole, excess) == (gone if any(nothing) else None)

@@ -174,12 +174,20 @@ def test_another_shape_of_the_first_is_taken_before_it_is_said_that_no_second_pa
     assert named(Told(ranks, None, {20e3: 19e3})) == ["cogging"]  # of what is left a twentieth is no shape
 
 
+class Counting(Told):
+    """A search that counts its turns."""
+
+    turns = 0
+
+    def _turn(self, path: Any) -> Any:
+        self.turns += 1
+        return super()._turn(path)
+
+
 def test_where_nothing_is_left_a_search_ends():
     """With less than the noise should leave no shape is another."""
-    search = Told({(): {"cogging": 900.0}, ("cogging",): {"force_bias": 899.0}}, None, {})
-    turns = []
-    search._turn = lambda path: turns.append(1) or Search._turn(search, path)  # type: ignore[method-assign,func-returns-value]
-    assert named(search) == ["cogging"] and len(turns) == 2
+    search = Counting({(): {"cogging": 900.0}, ("cogging",): {"force_bias": 899.0}}, None)
+    assert named(search) == ["cogging"] and search.turns == 2
 
 
 class Reshaping(Told):
