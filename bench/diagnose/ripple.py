@@ -78,18 +78,26 @@ class Waves:
     def _promises(self, column: Column, step: float, combined: tuple[tuple[int, int], ...]) -> list[Promise]:
         every = sorted({wave for pair in combined for wave in pair if wave})
         pairs = {k: [self._column(column, 1.0 / (k * step), phase) for phase in (0.0, 0.5 * math.pi)] for k in every}
-        at = {k: slice(2 * i, 2 * i + 2) for i, k in enumerate(pairs)}
+        at = {k: (2 * i, 2 * i + 1) for i, k in enumerate(pairs)}
         columns = np.stack([wave for pair in pairs.values() for wave in pair], axis=1)
         norm = np.linalg.norm(columns, axis=0)
         usable = np.isfinite(norm) & (norm > 1e-9)
         columns = np.where(usable, columns, 0.0)
         gram, along = columns.T @ columns, np.sum(columns * self.residual[:, None], axis=0)
         found: list[Promise] = []
-        for k, other in combined:
-            of = np.r_[at[k], at[other]] if other else np.r_[at[k]]
-            if usable[of].all():
-                sizes = np.linalg.lstsq(gram[np.ix_(of, of)], along[of], rcond=1e-10)[0]
-                found.append((float(sizes @ along[of]), k, other, sizes))
+        for alone in (True, False):  # those of two numbers, and those of four
+            chosen = [(k, other) for k, other in combined if (other == 0) is alone]
+            of = np.array([[*at[k], *(() if alone else at[other])] for k, other in chosen], dtype=np.intp)
+            if not len(of):
+                continue
+            inverse = np.linalg.pinv(gram[of[:, :, None], of[:, None, :]], rcond=1e-10, hermitian=True)
+            sizes = np.einsum("kij,kj->ki", inverse, along[of])
+            promised = np.sum(sizes * along[of], axis=1).tolist()
+            found += [
+                (promise, *waves, own)
+                for promise, waves, own, told in zip(promised, chosen, sizes, usable[of].all(axis=1), strict=True)
+                if told
+            ]
         return sorted(found, key=lambda one: -one[0])
 
 

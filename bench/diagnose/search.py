@@ -172,6 +172,8 @@ class Search(Sieve):
         same = other is not now and now.chi2 - other.chi2 > SAME * (now.chi2 - best.fit.chi2)
         if not turn.found.pays and now.chi2 - other.chi2 > A_SHAPE * max(now.chi2 - self.expected, 0.0):
             return other  # what its old shape missed may have hidden what comes next
+        if same and unexplained(other.chi2, self.expected) <= 0.0:
+            return other  # no further cause, in whatever shape, leaves less
         if turn.found.pays or same:
             shaped = self._in_shape(now, turn.ranked, len(path.fits) == 1, same)
             if len(path.fits) > 1 or not self._two_instead(path, best, shaped[0]):
