@@ -23,6 +23,10 @@ TOLD = 0.002
 
 FLAGS_GOOD = 0.9
 
+IMITATED = 0.25
+"""Of the misfit's power: one or two causes of the catalogue that leave no more imitate what was hidden; as much may be
+left of what is called explained (docs/formats.md)."""
+
 
 @dataclass(frozen=True)
 class Rate:
@@ -99,6 +103,14 @@ def spurious(line: Line) -> bool:
 def detectable(line: Line) -> bool:
     """By the noise-free misfit of the believed structure (tests/truth/detect.py)."""
     return bool(line["truth"]["detectable"])
+
+
+def imitated(line: Line) -> bool:
+    """Of an effect outside the catalogue: whether the one or two causes named leave so little of it, without noise."""
+    left_N = line.get("clean_rmse_N")  # older lines have none
+    if left_N is None or len(causes(line)) not in (1, 2):
+        return False
+    return bool(left_N**2 <= IMITATED * line["truth"]["misfit_N"] ** 2)
 
 
 def both_detectable(line: Line) -> bool:

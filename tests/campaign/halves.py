@@ -22,6 +22,7 @@ from .count import (
     detectable,
     found,
     found_or_alike,
+    imitated,
     least_beside,
     rate,
     right_first,
@@ -77,6 +78,7 @@ def shaped(by: Mapping[str, Sequence[Line]]) -> list[Figure]:
     pairs, outside = [p for p in by["pair"] if both_detectable(p)], [o for o in by["outside"] if detectable(o)]
 
     plain = [p for p in pairs if least_beside(p) >= PLAIN]
+    unlike = [o for o in outside if not imitated(o)]
 
     def unexplained(line: Line) -> bool:
         return bool(line["said"]["verdict"] == "unexplained")
@@ -105,6 +107,7 @@ def shaped(by: Mapping[str, Sequence[Line]]) -> list[Figure]:
         Figure("… and nothing else", None, True, rate(pairs, both_alone)),
         Figure("… each seen beside the other, χ² ≥ 600", None, True, rate(plain, both)),
         Figure("outside the catalogue: unexplained", 0.93, True, rate(outside, unexplained)),
+        Figure("… that the one or two named do not imitate", 0.93, True, rate(unlike, unexplained)),
     ]
 
 

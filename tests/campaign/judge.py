@@ -10,19 +10,22 @@ import math
 import tempfile
 import time
 import traceback
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bench.recording.types import Measurement
+from sim.model import Model
 from tests.truth.beside import seen_beside
 from tests.truth.cases import Case, draw_case
 from tests.truth.detect import Lab, _sigma, _whitened, freed, misfit, of_the_pad, sampling
 from tests.truth.noise import Coloured, Quantised, StudentT, White
 from tests.truth.rivals import as_good, as_good_in_place
 
-from .plan import Item
+from .plan import CATALOGUE, Item
 
 ROOT = Path(__file__).resolve().parents[2]
 FLAGS = {"saturated": "saturation", "stuck": "stuck_samples", "outlier": "outliers"}
@@ -116,17 +119,33 @@ def diagnosed(case: Case, folder: Path) -> dict[str, Any]:
         for a in list(getattr(result, "ranking", []))[:RANKED]
     ]
     flagged = score_flags(case, measurement.force_time_s, flags)
-    return {"said": said, "ranking": ranking, "flags": flagged, "seconds": wall, "cpu_seconds": cpu}
+    line = {"said": said, "ranking": ranking, "flags": flagged, "seconds": wall, "cpu_seconds": cpu}
+    if case.truth.ids and not set(case.truth.ids) & set(CATALOGUE):
+        line["clean_rmse_N"] = clean_rmse_N(case, measurement, Model.from_dict(result.model_dict))
+    return line
+
+
+def clean_rmse_N(case: Case, measurement: Measurement, model: Model) -> float:
+    """RMS of what a model is off by from the force without noise, along the motion as it was measured."""
+    from bench.like import likeness
+
+    clean_N = case.truth.clean_N[_rows(case, measurement.force_time_s)]
+    return likeness(model, replace(measurement, force_N=clean_N)).rmse_N
+
+
+def _rows(case: Case, force_time_s: np.ndarray) -> np.ndarray:
+    """The truth's row of each stamp that the reading of the file kept."""
+    stamps = case.time_s if case.force_time_s is None else case.force_time_s
+    return np.searchsorted((stamps[1:] + stamps[:-1]) / 2, force_time_s)
 
 
 def score_flags(case: Case, force_time_s: np.ndarray, flags: dict[str, list[int]]) -> dict[str, list[int]]:
     """By fault (hit, flagged, true) samples, among those that the reading of the file kept; `any` for all at once."""
-    stamps = case.time_s if case.force_time_s is None else case.force_time_s
-    index = np.searchsorted((stamps[1:] + stamps[:-1]) / 2, force_time_s)
+    index = _rows(case, force_time_s)
     n, out = len(index), {}
     all_said, all_true = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     for mine, theirs in FLAGS.items():
-        true = case.truth.flags.get(mine, np.zeros(len(stamps), dtype=bool))[index]
+        true = case.truth.flags.get(mine, np.zeros(len(case.force_N), dtype=bool))[index]
         said = np.zeros(n, dtype=bool)
         said[np.asarray(flags.get(theirs, []), dtype=int)] = True
         all_said, all_true = all_said | said, all_true | true

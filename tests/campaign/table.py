@@ -130,6 +130,9 @@ WHAT_IS_COUNTED = """
   each effect alone would be detectable. *Or listed …*: one that is not named stands among the alternatives of a name
   that was not hidden, which in its place fits as well. *Each seen beside the other*: of those, pairs of which neither
   effect can be made by the pad's numbers and the other's size but for χ² of 600 (table of pairs below).
+- *That the one or two named do not imitate*: without the cases in which one or two causes were named that leave at most
+  a quarter of the misfit's power where there is no noise: with so little left a cause is called explained, and the
+  effect outside the catalogue is one that a single or a pair imitates.
 - *Parameter*: each of the contract's parameters of a cause that was rightly named first. The bound is that of Cramér
   and Rao for the effect's size with the pad's numbers unknown.
 - *Noise floor*: the deviation of the force noise, and the same with the position's noise through the stiffness. A

@@ -7,13 +7,25 @@ import json
 import numpy as np
 import pytest
 
+from bench.recording import read_recording
+from sim.model import Model
 from tests.truth.cases import draw_case
 from tests.truth.effects import EFFECTS
 
 from .__main__ import read
-from .count import Rate, found_or_alike, least_beside, right_listed, right_or_alike, spurious, stated, wrongs
+from .count import (
+    Rate,
+    found_or_alike,
+    imitated,
+    least_beside,
+    right_listed,
+    right_or_alike,
+    spurious,
+    stated,
+    wrongs,
+)
 from .halves import half as half_of
-from .judge import bounds, score_flags, truth_of
+from .judge import bounds, clean_rmse_N, score_flags, truth_of
 from .plan import CATALOGUE, Item, plan
 from .table import page
 
@@ -92,6 +104,17 @@ def test_flags_are_counted_among_the_samples_that_were_read():
     assert score_flags(case, stamps, {"outliers": sorted(said)})["outliers"] == [n - 1, n + 2, n]
 
 
+def test_a_model_is_held_against_the_force_without_noise(tmp_path):
+    # The pad as it is, but for a bias that nobody told it of; the noise of 20 mN is not counted.
+    how = {"protocol": "rich", "noise_kind": "white", "noise_N": 0.02, "position_noise_mm": 0.0, "jitter": "none"}
+    case = draw_case(2, ("force_bias",), 1.0, "constant", **how)
+    case.write(tmp_path)
+    measurement = read_recording(tmp_path / "data.csv").measurement()
+    model = Model.from_dict(case.truth.structure.model())
+    bias_N = case.truth.parameters["force_bias"]["bias"]
+    assert clean_rmse_N(case, measurement, model) == pytest.approx(abs(bias_N), rel=0.03)
+
+
 def test_bound_of_a_bias_by_hand():
     # A constant beside a pad of known shape: never better than σ/√n, and near it since the air tells it.
     item = Item("single", ("force_bias",), ("constant",), (1.0,), 5, "white")
@@ -117,6 +140,7 @@ def line(said, hidden=("friction",), group="single", verdict="explained", **more
         "detectable": True,
         "alone": dict.fromkeys(hidden, True),
         "noise_N": 0.010,
+        "misfit_N": 0.040,
         "floor_N": 0.012,
         "of_noise_power": 1.0,
         "chi2": 1e4,
@@ -162,6 +186,21 @@ GOOD = ("friction", 0.105, 0.001, ())
 )
 def test_what_is_wrong_with_a_line(case, wrong):
     assert wrongs(case) == wrong
+
+
+@pytest.mark.parametrize(
+    "said, left_N, is_one",
+    [
+        ([GOOD], 0.019, True),
+        ([GOOD], 0.021, False),
+        ([GOOD, ("backlash", 0.1, 0.1, ())], 0.019, True),
+        ([GOOD, ("backlash", 0.1, 0.1, ()), ("inertia", 0.1, 0.1, ())], 0.019, False),
+        ([], 0.0, False),
+    ],
+)
+def test_an_imitation_of_what_is_outside_the_catalogue(said, left_N, is_one):
+    assert imitated(line(said, ("elsewhere",), "outside", clean_rmse_N=left_N)) is is_one
+    assert not imitated(line(said, ("elsewhere",), "outside"))
 
 
 def test_second_causes_and_alternatives():
