@@ -42,80 +42,65 @@ from sim.effects.base import Effect, Form, Parameter
 from sim.effects.linear import first_order as lagged
 from sim.effects.linear import low_pass
 from sim.effects.stamps import HALF_TIME
-from sim.jit import State, block
+from sim.jit import State, block, compiled
 
 _Y, _LAST, _STARTED, _Y2, _V, _V2 = range(6)
 _SINCE = 3  # in place of a second output: time since the first sample
 
 
+@compiled("float64(float64, float64, float64, float64, float64, float64)")
+def _one_pole(dt: float, started: float, y: float, before: float, u: float, tau: float) -> float:
+    """Output of 1/(1 + τs) after dt; at the first sample, and where nothing lags, the input."""
+    if started == 0.0 or tau <= 0.0:
+        return u
+    return lagged(dt, y, before, u, tau)
+
+
 @block
 def first_order(dt: float, u: float, state: State, p: State) -> float:
     """τ y' = u − y; p = (time_constant,)."""
-    if state[_STARTED] == 0.0 or p[0] <= 0.0:
-        state[_STARTED] = 1.0
-        state[_Y] = u
-    else:
-        y = lagged(dt, state[_Y], state[_LAST], u, p[0])
-        state[_Y] = y
-    state[_LAST] = u
-    return state[_Y]
+    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, p[0])
+    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
+    return y
 
 
 @block
 def partly(dt: float, u: float, state: State, p: State) -> float:
     """A share passes a lag of τ/share, the rest at once; p = (time_constant, share)."""
-    if state[_STARTED] == 0.0 or p[0] <= 0.0:
-        state[_STARTED] = 1.0
-        state[_Y] = u
-    else:
-        y = lagged(dt, state[_Y], state[_LAST], u, p[0] / p[1])
-        state[_Y] = y
-    state[_LAST] = u
-    return u + p[1] * (state[_Y] - u)
+    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, p[0] / p[1])
+    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
+    return u + p[1] * (y - u)
 
 
 @block
 def throttled(dt: float, u: float, state: State, p: State) -> float:
     """One pole, of one time as the output rises and another as it falls; p = (time_constant, uneven)."""
-    if state[_STARTED] == 0.0 or p[0] <= 0.0:
-        state[_STARTED] = 1.0
-        state[_Y] = u
-    else:
-        rises = 0.5 * (state[_LAST] + u) > state[_Y]
-        y = lagged(dt, state[_Y], state[_LAST], u, p[0] * (1.0 - p[1] if rises else 1.0 + p[1]))
-        state[_Y] = y
-    state[_LAST] = u
-    return state[_Y]
+    rises = 0.5 * (state[_LAST] + u) > state[_Y]
+    tau = p[0] * (1.0 - p[1] if rises else 1.0 + p[1])
+    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, tau)
+    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
+    return y
 
 
 @block
 def loaded(dt: float, u: float, state: State, p: State) -> float:
     """One pole, whose time goes with the force; p = (time_constant, growth, at_force)."""
-    if state[_STARTED] == 0.0 or p[0] <= 0.0:
-        state[_STARTED] = 1.0
-        state[_Y] = u
-    else:
-        borne = min(max(state[_Y] / p[2], 0.0), 2.0)
-        y = lagged(dt, state[_Y], state[_LAST], u, p[0] * math.exp(p[1] * (borne - 1.0)))
-        state[_Y] = y
-    state[_LAST] = u
-    return state[_Y]
+    borne = min(max(state[_Y] / p[2], 0.0), 2.0)
+    tau = p[0] * math.exp(p[1] * (borne - 1.0))
+    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, tau)
+    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
+    return y
 
 
 @block
 def warming(dt: float, u: float, state: State, p: State) -> float:
     """One pole, whose time goes with the time since the first sample; p = (time_constant, growth, bend, at_time)."""
-    if state[_STARTED] == 0.0 or p[0] <= 0.0:
-        state[_STARTED] = 1.0
-        state[_Y] = u
-    else:
-        middle = (state[_SINCE] + 0.5 * dt) / p[3] - 1.0
-        goes = p[1] * middle + p[2] * (1.5 * middle * middle - 0.5)
-        y = lagged(dt, state[_Y], state[_LAST], u, p[0] * math.exp(goes))
-        state[_Y] = y
+    middle = (state[_SINCE] + 0.5 * dt) / p[3] - 1.0
+    tau = p[0] * math.exp(p[1] * middle + p[2] * (1.5 * middle * middle - 0.5))
+    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, tau)
+    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
     state[_SINCE] += dt
-    state[_LAST] = u
-    return state[_Y]
+    return y
 
 
 @block
