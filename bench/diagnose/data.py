@@ -30,6 +30,7 @@ SHORT = 1500  # samples that need no stand-in
 LEAST_SHARED = 1e-2  # of the noise's own square: what is shared and less changes nothing
 TARGET, MOST = 4000, 6000  # samples of the stand-in, where its blocks can be that long
 FASTEST, WIDEST = 0.12, 8.0  # growth of blocks; times what the travel within one may make of force
+FINELY = 2e-3  # of the travel, that a block spans at the most: in air nothing but inertia and friction tell of motion
 
 
 @dataclass(frozen=True)
@@ -341,19 +342,19 @@ def _blocks(full: Data, stiffness: float, sigma_force: float, jump_mm: float) ->
     n = full.size
     if n <= SHORT:
         return np.arange(n)
+    finest = min(sigma_force / max(stiffness, 1e-9), FINELY * float(np.ptp(full.position_mm)))
     rate, wider = 0.05, 1.0
     while True:
-        owner = _grouped(full, stiffness, wider * sigma_force * (rate / 0.05), rate, jump_mm)
+        owner = _grouped(full, wider * finest * (rate / 0.05), rate, jump_mm)
         if owner[-1] < TARGET or (rate > FASTEST and (owner[-1] < MOST or wider >= WIDEST)):
             return owner
         # within a move the force goes nearly straight with the position: wide blocks hide less there than after corners
         rate, wider = (rate, 2.0 * wider) if rate > FASTEST else (1.4 * rate, wider)
 
 
-def _grouped(full: Data, stiffness: float, step_N: float, rate: float, jump_mm: float) -> NDArray[np.intp]:
-    """`step_N`: force that the travel within a block may make; `rate`: growth of blocks; `jump_mm`: what noise alone
-    makes of a change of speed."""
-    reach = step_N / max(stiffness, 1e-9)
+def _grouped(full: Data, reach: float, rate: float, jump_mm: float) -> NDArray[np.intp]:
+    """`reach`: travel within a block, mm; `rate`: growth of blocks; `jump_mm`: what noise alone makes of a change of
+    speed."""
     position = full.position_mm
     step = np.diff(position, prepend=position[0])
     turns = np.zeros(full.size, dtype=bool)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from bench.diagnose import diagnose
 from bench.recording.types import Measurement
@@ -14,6 +15,7 @@ from tests.truth.motion import Path
 AIR = {"pad": {"elastic": {"law": "none"}, "relaxation": {"shares": [], "rates": []}, "contact": "unilateral"}}
 RATE_HZ, NOISE_N, WAVES_ALONG = 250.0, 0.008, 8.3
 COULOMB_N, COGGING_N = 0.08, 0.12
+MASS_KG, SERVO_S, FINE_S = 0.2, 4e-3, 1e-4
 
 
 def to_and_fro(seed: int) -> Measurement:
@@ -31,6 +33,36 @@ def to_and_fro(seed: int) -> Measurement:
     at = motion.position(t) + 3e-4 * rng.standard_normal(len(t))
     felt = np.interp(t, fine, force) + NOISE_N * rng.standard_normal(len(t))
     return Measurement("air", t, at, t, felt)
+
+
+def started_and_stopped(seed: int) -> Measurement:
+    """A mass of 0.2 kg on the cell, moved at random above the surface by a drive that smooths, at 1 kHz."""
+    rng = np.random.default_rng(seed)
+    path = Path(-6.0, 3000.0).hold(1.0)
+    for target in rng.uniform(-11.0, -0.5, 16):
+        path = path.to(float(target), float(rng.uniform(25.0, 80.0))).hold(0.6)
+    motion = path.motion()
+    fine = np.arange(0.0, motion.duration_s, FINE_S)
+    keeps = float(np.exp(-FINE_S / SERVO_S))
+    begin = motion.position(fine[0])
+    x = motion.position(fine) - begin
+    for _ in range(2):
+        x = lfilter([1.0 - keeps], [1.0, -keeps], x)
+    x += begin
+    force = 1e-3 * MASS_KG * np.gradient(np.gradient(x, FINE_S), FINE_S)
+    t = np.arange(0.0, motion.duration_s - 0.01, 1e-3)
+    at = np.interp(t, fine, x) + 3e-4 * rng.standard_normal(len(t))
+    felt = np.interp(t, fine, force) + NOISE_N * rng.standard_normal(len(t))
+    return Measurement("air", t, at, t, felt)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, *(pytest.param(s, marks=pytest.mark.long) for s in (3, 4, 5))])
+def test_a_mass_is_found_in_a_long_run_without_a_pad(seed: int) -> None:
+    # Nothing but the motion says there how finely the run must be looked at.
+    said = diagnose(started_and_stopped(seed), Model.from_dict(AIR))
+    assert said.verdict == "explained" and [cause.id for cause in said.causes] == ["inertia"]
+    assert said.causes[0].parameters["mass"].value == pytest.approx(MASS_KG, rel=0.05)
 
 
 @pytest.mark.slow
