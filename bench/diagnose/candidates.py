@@ -22,6 +22,7 @@ from . import ripple
 from .data import Data
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, errors, extended, force_at, jacobian
+from .way import on_the_way
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,8 @@ CHANNEL = ("outliers", "stuck_samples", "mains_hum")  # found by detectors, not 
 MOST_STARTS = 96
 LOWEST_RINGING_HZ, FREQUENCIES = 4.0, 32
 NEARBY, ABOUT = 7, 2.0  # frequencies about one that was found, and up to how many times it, either way
-SHORTEST, SHORTEST_IN_AIR = 0.12, 0.03  # of the longest period
+SHORTEST, SHORTEST_MOVING = 0.12, 0.03  # of the longest period
+MOSTLY = 0.5  # of the force samples, that are on the way
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
@@ -65,8 +67,9 @@ class Reach:
     rich: bool = True
     """Whether depths are held, or passed again: what depends on the position alone differs there from a law, which
     relaxes. In one pass over the depth it is told only by many periods."""
-    in_air: bool = False
-    """Whether there is no pad: then the moves show the ripple itself, all along the travel."""
+    moving: bool = False
+    """Whether there is no pad, or most forces were felt on the way: then the moves show a ripple itself, all along the
+    travel."""
 
     @classmethod
     def of(cls, data: Data, structure: Structure, sample_s: float, rich: bool = True) -> Reach:
@@ -81,7 +84,7 @@ class Reach:
             force_N=force_N,
             changes_N=max(float(np.sum(np.abs(np.diff(into_mm)))) * force_N / depth_mm, force_N),
             rich=rich,
-            in_air=structure.in_air,
+            moving=structure.in_air or on_the_way(data) > MOSTLY,
         )
 
 
@@ -129,7 +132,7 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         upper = min(upper, 3.0 * reach.span_s)
     elif p.name == "period":
         # some levels of depth are met by any ripple that is short enough
-        shortest = SHORTEST_IN_AIR if reach.in_air else SHORTEST
+        shortest = SHORTEST_MOVING if reach.moving else SHORTEST
         lower, upper = max(lower, shortest * longest_mm), min(upper, longest_mm)
     elif p.name == "range":  # a pull beyond the widest gap is a bias; a pad may lag by half its depth
         upper = min(upper, reach.travel_mm - 0.5 * reach.depth_mm)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich which come back
 LEAST = 0.05  # of the travel: less is no way, nor another level
+MOVES = 0.2  # of the mean speed over all of the run
 TOLD_ONCE = 0.5  # how sure a name can be of what acts with the motion, where data are not rich
 
 
@@ -32,6 +33,14 @@ def is_rich(data: Data) -> bool:
         if level > LEAST * span and all(abs(level - other) > LEAST * span for other in levels):
             levels.append(level)
     return len(levels) >= LEVELS or _passes(x, 0.5 * span) >= PASSES
+
+
+def on_the_way(data: Data) -> float:
+    """Share of the force samples that were taken while the position moved."""
+    way_mm, apart_s = np.abs(np.diff(data.position_mm)), np.diff(data.time_s)
+    mean_speed = float(way_mm.sum()) / max(float(data.time_s[-1] - data.time_s[0]), 1e-300)
+    moves = way_mm > MOVES * mean_speed * apart_s
+    return float(data.weight[1:][moves].sum() / max(data.weight.sum(), 1e-300))
 
 
 def most_sure(effect: Effect, rich: bool) -> float:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bench.diagnose import Diagnosis, diagnose
 from bench.diagnose.data import Data
-from bench.diagnose.way import TOLD_ONCE, is_rich
+from bench.diagnose.way import TOLD_ONCE, is_rich, on_the_way
 from sim.effects import all_effects
 from sim.model import Model
 from tests.bench.diagnose.small import case, diagnosed, measurement
-from tests.truth.motion import staircase
+from tests.truth.cases import draw_case
+from tests.truth.motion import Path, staircase
 
 
 def data(levels_mm: list[float], hold_s: float = 1.0) -> Data:
@@ -38,6 +41,29 @@ def data(levels_mm: list[float], hold_s: float = 1.0) -> Data:
 )
 def test_several_depths_held_or_passes_make_data_rich_that_come_back(levels_mm, rich):
     assert is_rich(data(levels_mm)) is rich
+
+
+@pytest.mark.parametrize(("hold_s", "share"), [(0.0, 1.0), (1.0, 0.5), (9.0, 0.1)])
+def test_the_share_of_the_forces_that_are_felt_on_the_way(hold_s, share):
+    assert on_the_way(data([1.0, 2.0, 1.0, 0.0], hold_s)) == pytest.approx(share, abs=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, *(pytest.param(s, marks=pytest.mark.long) for s in (3, 4, 5, 6))])
+def test_a_short_ripple_is_found_where_the_pad_is_pressed_to_and_fro(seed):
+    """Held at some depths, any ripple that is short enough has what is there; on the way between them one alone has."""
+    rng, path = np.random.default_rng(seed), Path(-0.5, 3000.0).hold(1.0)
+    for _ in range(8):
+        path = path.to(3.0, 1.0).to(float(rng.uniform(-0.5, 0.3)), 1.5)
+    force_N, period_mm = 0.06, float(rng.uniform(0.25, 0.45))
+    c = draw_case(seed, (), motion=path.hold(1.0).motion(), rate_hz=150.0, noise_kind="white", noise_N=0.01)
+    m = measurement(c)
+    wave_N = force_N * np.sin(2 * np.pi * np.interp(m.force_time_s, c.time_s, c.truth.reported_mm) / period_mm + seed)
+    d = diagnose(replace(m, force_N=m.force_N + wave_N), Model.from_dict(c.believed))
+    found = d.causes[0].parameters
+    assert d.verdict == "explained" and [cause.id for cause in d.causes] == ["cogging"]
+    assert found["period"].value == pytest.approx(period_mm, rel=0.01)
+    assert found["amplitude"].value == pytest.approx(force_N, rel=0.05)
 
 
 def of_motion(d: Diagnosis) -> list[float]:
