@@ -16,7 +16,7 @@ from bench.felt_motion import resolution
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 
-from .coarse import coarse_repeats
+from .coarse import coarse_repeats, noise_steps
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -24,6 +24,7 @@ Mask = NDArray[np.bool_]
 AGAIN = 0.01  # of the samples that repeat the one before, at the least, where digits are not so many
 FEW_REPEATS = 4  # equal pairs that are no accident where digits are many
 CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
+HARDLY = 0.8  # steps: less noise hardly leaves one where the force is at rest
 STANDS = 0.5  # share of equal pairs beyond which noise is less than half a step
 LEAPS = 3  # steps by which what has stuck in such a channel catches up, at the least
 SETTLING = 20  # samples after a move that are not yet a hold
@@ -300,11 +301,14 @@ def _stuck(force: Array, but: Mask) -> Mask:
         window = max(len(force) // 40, 20)
         shares = np.convolve(same, np.ones(window) / window, mode="same")
         p = max(float(np.median(shares[window:-window] if len(force) > 3 * window else shares)), 0.05)
-        if p > STANDS:  # noise hardly leaves a step: in its middle a force stands long, but nothing leaps in the end
+        # neighbours are apart as often as noise crosses a step's edge, of which there is one wherever the force is
+        noise = noise_steps(force, step)
+        if p > STANDS:
+            noise = np.fmin(noise, 0.5 * np.sqrt(np.pi) * (1.0 - p))
+        if p > STANDS or noise < HARDLY:  # it hardly leaves a step: in its middle a force stands long, but nothing
+            # leaps in the end
             caught = (length >= _least(min(p, 0.97), len(force))) & _catches_up(force, first, length, step)
-            # neighbours are apart as often as noise crosses a step's edge, of which there is one wherever the force is
-            noise_steps = 0.5 * np.sqrt(np.pi) * (1.0 - p)
-            p = float(np.clip(2.0 * norm.cdf(0.5 / max(noise_steps, 1e-3)) - 1.0, p, 1.0 - 1e-12))
+            p = float(np.clip(2.0 * norm.cdf(0.5 / max(noise, 1e-3)) - 1.0, p, 1.0 - 1e-12))
     else:
         chance = _equal_by_chance(force)
         p = 0.0 if _no_accident(int(same.sum()), chance) else min(max(chance / len(force), AGAIN), 0.97)

@@ -20,6 +20,9 @@ ENOUGH = 50  # changes of a size, either way, that tell how likely it is
 RARE = 1e-3  # chance of so many equal pairs in motion
 FASTEST, RARER = 0.01, 1e-4  # chance of one equal pair in fast motion, at the most; and of so many
 AMID = 0.01  # chance of so many equal pairs amid those that differ by a step or two
+WINDOW, FEWEST = 50, 8  # samples looked at together, and the fewest such windows that tell of the noise
+PASSED = 1.5  # steps that the force moves there at the least
+HIDDEN = 0.4  # steps: less noise does not show at rest
 FINEST = 0.6  # steps that a change scatters by at the least: of rounding alone
 
 
@@ -32,6 +35,32 @@ class _Excess:
     std: float
     scatter: float
     sure: bool
+
+
+def noise_steps(force: Array, step_N: float) -> float:
+    """Standard deviation of a coarse channel's noise before rounding, in steps; nan where nothing tells of it.
+
+    Told where the force moves, so that each place within a step is met alike: between two samples it crosses as many
+    edges as steps, on the average |δ + √2 σ z| with δ its own way and z standard normal, nearly √(δ² + 4σ²/π). At rest
+    a force stands in the middle of a step, or at an edge.
+    """
+    change = np.diff(force) / step_N
+    windows = change[: len(change) // WINDOW * WINDOW].reshape(-1, WINDOW)
+    way, crossed = np.abs(windows.mean(axis=1)), np.abs(windows).mean(axis=1)
+    moving = np.flatnonzero(way * WINDOW > PASSED)
+    slow = moving[np.argsort(way[moving], kind="stable")][
+        : max(len(moving) // 4, FEWEST)
+    ]  # where noise counts the most
+    if len(slow) < FEWEST:
+        return float("nan")
+    return float(0.5 * np.sqrt(np.pi * max(np.mean(crossed[slow] ** 2 - way[slow] ** 2), 0.0)))
+
+
+def rounded(force: Array, step_N: float) -> float:
+    """What rounding makes of a force (m,) at the least, standard deviation, N; with the noise before it where that
+    hardly leaves a step, so that at rest it does not show."""
+    steps = noise_steps(force, step_N) if step_N > 0.0 else 0.0
+    return step_N * float(np.sqrt(1.0 / 12.0 + (steps**2 if steps < HIDDEN else 0.0)))
 
 
 def coarse_repeats(force: Array, but: Mask) -> tuple[Mask, float | None]:

@@ -17,6 +17,7 @@ from bench.restamp import restamped
 from sim.grid import Grid, union
 from sim.jit import compiled
 
+from .coarse import rounded
 from .hum import Line, find
 from .noise import Colour, ForceNoise, force_noise, hold_errors
 from .whiten import Whitening, whitening
@@ -275,7 +276,7 @@ def prepare(m: Measurement, good: Mask) -> Prepared:
         m = replace(m, force_N=m.force_N - taken_N)
     motion = felt(m.position_time_s, m.position_mm)
     noise = force_noise(m, good)
-    sigma_force = max(noise.force_N, resolution(m.force_N) / np.sqrt(12.0), 1e-9)
+    sigma_force = max(noise.force_N, rounded(m.force_N[good], resolution(m.force_N)), 1e-9)
     grid, where = union(motion.time_s, m.force_time_s)
     position = motion.at(grid)
     stiffness = stiffness_along(m)
