@@ -38,6 +38,7 @@ from .shapes import reshaped
 from .spread import covariance
 from .swing import Swing
 from .swing import find as swinging
+from .units import doubts
 from .verdict import chain, excesses, explains, found, no_size, ordered, seen, sureness, told_size, without
 from .way import most_sure
 from .write import model_of
@@ -378,6 +379,7 @@ def _concluded(
         seconds=time.perf_counter() - begun,
         model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
         notes=list(m.notes),
+        doubts=doubts(m, search.believed.pad.pad, _pad_of(path.fits[0])),
         remainders=tests,
         name=m.name,
         seen_once=any(most_sure(all_effects()[c.id], search.reach.rich) < 1.0 for c in causes),
@@ -392,6 +394,11 @@ def _concluded(
         ranking=_ranking(path),
         rivals=[(t.id, model_of(believed, t.fit, prepared)) for t in (path.rivals[0][:RIVALS] if path.rivals else [])],
     )
+
+
+def _pad_of(fit: Fit) -> Pad:
+    numbers = fit.structure.pad
+    return numbers.at(fit.x[: len(numbers.coordinates)])
 
 
 def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:

@@ -111,6 +111,8 @@ class Diagnosis:
     model_dict: dict[str, Any]
     next_protocol: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+    """What makes the data's units or sign doubtful; in the file's notes too."""
     remainders: list[Remainder] = field(default_factory=list)
     name: str = ""
     seen_once: bool = False
@@ -157,6 +159,6 @@ class Diagnosis:
             ],
             "flags": {name: np.flatnonzero(mask).tolist() for name, mask in self.flags.items() if mask.any()},
             "next_protocol": self.next_protocol,
-            "notes": self.notes,
+            "notes": [*self.notes, *self.doubts],
             "seconds": self.seconds,
         }

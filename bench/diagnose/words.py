@@ -139,13 +139,14 @@ def remains(d: Diagnosis, most: int = REMAINS) -> list[str]:
 
 
 def warnings(d: Diagnosis) -> list[str]:
-    """What makes the names doubtful, and the cure."""
+    """What makes the data or the names doubtful, and the cure."""
     if not d.seen_once:
-        return []
+        return d.doubts
     return [
+        *d.doubts,
         f"the run never comes back, or goes to and fro less than twice and holds at fewer than {LEVELS} depths: what"
         " acts with the motion cannot be told from a pad that is stranger than its law there, and no such name is more"
-        f" than {percent(TOLD_ONCE)} sure (press and return more often, or hold at more depths)"
+        f" than {percent(TOLD_ONCE)} sure (press and return more often, or hold at more depths)",
     ]
 
 
