@@ -29,6 +29,7 @@ LIKELY, CHANCE = 4.0, 5.0  # standard deviations: levels nearer are one, samples
 FEWEST = 10  # samples of a level within a hold
 BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
 TOGETHER = 20  # samples that share the error of a window, about
+ASTRAY = 1.4  # times what noise makes of a window's value: so far off is it, in sines of any speed
 WIDTH = 2.2  # standard deviations on either side of a value
 
 
@@ -213,6 +214,8 @@ def _rested(
             levels = [float(inside[i:j].mean()) for i, j in pairwise([0, *cuts, n])]
             edges[0] -= _staying((behind - levels[0]) / noise_mm)
             edges[-1] += _staying((ahead - levels[-1]) / noise_mm)
+            if not (cuts or coarse) and _turns((position_mm[edges[0] : edges[-1]] - level) / noise_mm):
+                continue
             for (first, end), value in zip(pairwise(edges), levels, strict=True):
                 numbered += 1
                 clean[first:end], std[first:end] = value, noise_mm / np.sqrt(end - first)
@@ -243,6 +246,14 @@ def _staying(off: Array) -> int:
     """How many of the samples after a rest belong to it still; `off`: from its level, in standard deviations."""
     strays = np.maximum(np.abs(off), np.abs(np.cumsum(off)) / np.sqrt(np.arange(1, len(off) + 1))) > LIKELY
     return max(int(np.argmax(strays)) - EDGE, 0) if strays.any() else len(off)
+
+
+def _turns(off: Array) -> bool:
+    """Whether samples lie about a bow, and so are no rest: the turn of a slow sine goes by less than its noise. `off`:
+    from their mean, in standard deviations."""
+    u = np.linspace(-1.0, 1.0, len(off))
+    bow = u**2 - np.mean(u**2)
+    return abs(float(bow @ off)) > CHANCE * float(np.linalg.norm(bow))
 
 
 def _between(hold: NDArray[np.intp], first: int, last: int) -> list[slice]:
@@ -346,6 +357,8 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
             at_ends = max(float(std[first]), float(std[last]), 0.7 * coarse)
             std[inside] = max(2.0 * noise / np.sqrt(last - first + 1), at_ends)
             stretch[inside] = 1 + len(clean) + first
+        # a window grows until it shows that the motion is no parabola: by then it is off by as much again
+        std = np.where(stretch < 0, np.minimum(ASTRAY * std, np.maximum(std, noise)), std)
         # a coarse scale's error averages out over levels that are passed, not over readings of one
         std = np.where(np.abs(np.gradient(clean)) < 2.0 * step, np.maximum(std, coarse), std)
     time, position = motion_between(time_s, clean, noise_mm=left, planned=planned)
