@@ -133,3 +133,23 @@ def test_a_step_within_the_noise_between_rests_of_one_level_is_no_move():
     moving, resting = np.zeros(59, dtype=bool), np.zeros(60, dtype=bool)
     moving[20:23], resting[:20], resting[24:] = True, True, True
     assert fitted_moves(time, x, moving, [(20, 23)], 1.0, 1e-4, x, resting=resting) == {}
+
+
+@pytest.mark.parametrize(("frequency_Hz", "noise_mm"), [(0.3, 1e-3), (1.5, 2e-3), (4.0, 2e-3)])
+def test_a_motion_of_no_planner_is_off_by_what_is_said(frequency_Hz: float, noise_mm: float) -> None:
+    """Over eight draws: the mean square of the errors over what they are said to be, within a third of one."""
+    t, squares = np.arange(0.0, 10.0, STEP_S), []
+    for seed in range(8):
+        x = np.sin(2.0 * np.pi * frequency_Hz * t + seed)
+        told = felt(t, x + noise_mm * np.random.default_rng(seed).standard_normal(t.size))
+        said = np.interp(t, told.time_s, told.std_mm)
+        squares.append(np.mean(((told.at(t) - x) / said) ** 2))
+    assert np.mean(squares) == pytest.approx(1.0, abs=0.33)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_turn_of_a_slow_sine_is_no_rest(seed: int) -> None:
+    """For a tenth of a second it goes by some deviations of the noise and no more."""
+    t = np.arange(0.0, 10.0, STEP_S)
+    x = np.sin(0.6 * np.pi * t + seed)
+    assert not felt(t, x + NOISE_MM * np.random.default_rng(seed).standard_normal(t.size)).rest.any()
