@@ -28,6 +28,7 @@ from .candidates import (
 from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
 from .felt_errors import felt_errors, redrawn
+from .late import LATE
 from .late_by_chance import late_by_chance_s
 from .numbers import Cause, cause_of, shapes_of
 from .path import Measure, Path, Trial
@@ -39,6 +40,7 @@ from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, repeatin
 Array = NDArray[np.float64]
 
 MANY_MORE = 2  # numbers of a shape beyond those of the plain one: then two plain causes are asked for in its place
+AS_LATE = 0.99  # of what the best takes: what makes the force late too and takes as much
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 AS_WELL = 0.8  # the same, of a second cause of a kind beside the first
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
@@ -134,6 +136,7 @@ class Search(Sieve):
             if other is not None:  # not a further cause, but one found of another shape
                 path.fits[-1] = other
                 continue
+            self._told_at_full_rate(path, turn)
             self._note(path, turn)
             if turn.of_a_shape or not self._added(path, turn):
                 break
@@ -194,6 +197,22 @@ class Search(Sieve):
                 return united
             turn.of_a_shape = True
         return None
+
+    def _told_at_full_rate(self, path: Path, turn: _Turn) -> None:
+        """Of what makes the force late and takes as much, the one in front that does so where each sample counts: means
+        over blocks smear what a delay keeps and a lag does not."""
+        now, best = path.fits[-1], turn.ranked[0]
+        enough = AS_LATE * (now.chi2 - best.fit.chi2)
+        late = [t for t in turn.ranked[: 1 + COMPARED] if t.id in LATE and now.chi2 - t.fit.chi2 > enough]
+        if best.id not in LATE or len(late) < 2 or self.short.size == self.prepared.full.size:
+            return
+        with ThreadPoolExecutor(WORKERS) as pool:
+            whole = list(pool.map(lambda t: refit(self.prepared.full, t.fit.structure, t.fit.x, MORE, 1e-6), late))
+        cost = [fit.chi2 + t.score - t.fit.chi2 for t, fit in zip(late, whole, strict=True)]
+        first = late[int(np.argmin(cost))]
+        if first is not best:
+            turn.ranked = [first, *(t for t in turn.ranked if t is not first)]
+            turn.found = self._lead(path, first)
 
     def _note(self, path: Path, turn: _Turn) -> None:
         stood = [*turn.ranked, *turn.small]
