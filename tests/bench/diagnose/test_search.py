@@ -161,6 +161,33 @@ def test_a_curve_through_points_that_leaves_nothing_stands_against_its_rivals_in
     assert Search._in_shape(begun, now, [law, wave], True, False)[0].id == ("encoder_error" if asked else law.id)
 
 
+@pytest.mark.parametrize(
+    ("lag", "delay", "first"),
+    [
+        ((2200.0, 4590.0), (2220.0, 4570.0), "force_delay"),  # on the stand-in, and at full rate
+        ((2200.0, 4570.0), (2220.0, 4590.0), "sensor_lag"),
+        ((2200.0, 4590.0), (9220.0, 4570.0), "sensor_lag"),  # so far behind on the stand-in that nobody asks
+    ],
+)
+def test_delay_and_lag_are_told_apart_where_each_sample_counts(monkeypatch, lag, delay, first):
+    short, full = SimpleNamespace(size=4000), SimpleNamespace(size=30_000)
+
+    def trial(id: str, chi2: float) -> Any:
+        return SimpleNamespace(id=id, fit=SimpleNamespace(chi2=chi2, structure=id, x=None), score=chi2 + 20.0)
+
+    whole = {"sensor_lag": lag[1], "force_delay": delay[1]}
+    monkeypatch.setattr(
+        "bench.diagnose.search.refit", lambda data, structure, x, *_: SimpleNamespace(chi2=whole[structure], data=data)
+    )
+    begun: Any = SimpleNamespace(prepared=SimpleNamespace(full=full), short=short, _lead=lambda path, best: best.id)
+    path: Any = SimpleNamespace(fits=[SimpleNamespace(chi2=5e5)])
+    other = trial("friction", 4e5)
+    turn: Any = SimpleNamespace(ranked=[trial("sensor_lag", lag[0]), trial("force_delay", delay[0]), other], found="")
+    Search._told_at_full_rate(begun, path, turn)
+    assert turn.ranked[0].id == first and {t.id for t in turn.ranked} == {"sensor_lag", "force_delay", "friction"}
+    assert turn.found == ("" if first == "sensor_lag" else "force_delay")
+
+
 @pytest.mark.long
 def test_a_cause_found_amid_another_is_asked_again_once_that_one_is_there():
     """A curve of many numbers is nearest while the clocks part; beside the skew an offset of one does as well."""
