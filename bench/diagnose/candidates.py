@@ -374,7 +374,7 @@ def _amended(fit: Fit, cause: Cause, drawn: ElasticLaw | None = None) -> list[Ca
     """Another law in place of the believed: numbers with which it is near `drawn`, or the curve that was fitted. Where
     the law stays, all starts."""
     structure = fit.structure
-    pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
+    pad = fit.pad
     fitted = cause.fitted
     assert cause.form.amend is not None
     amend = cause.form.amend
@@ -415,8 +415,7 @@ def alike(fit: Fit, index: int, cause: Cause) -> Cause:
     else with the numbers that they share."""
     amend, values = fit.structure.causes[index].form.amend, fit.structure.values(fit.x)[index]
     if amend is not None and cause.form.amend is not None:
-        pad = fit.structure.pad.at(fit.x[: len(fit.structure.pad.coordinates)])
-        return _amended(fit, cause, amend(pad, values).law)[0]
+        return _amended(fit, cause, amend(fit.pad, values).law)[0]
     return cause.with_start(**{p.name: values[p.name] for p in cause.fitted if p.name in values})
 
 

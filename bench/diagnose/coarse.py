@@ -48,9 +48,8 @@ def noise_steps(force: Array, step_N: float) -> float:
     windows = change[: len(change) // WINDOW * WINDOW].reshape(-1, WINDOW)
     way, crossed = np.abs(windows.mean(axis=1)), np.abs(windows).mean(axis=1)
     moving = np.flatnonzero(way * WINDOW > PASSED)
-    slow = moving[np.argsort(way[moving], kind="stable")][
-        : max(len(moving) // 4, FEWEST)
-    ]  # where noise counts the most
+    count = max(len(moving) // 4, FEWEST)
+    slow = moving[np.argsort(way[moving], kind="stable")][:count]  # where noise counts the most
     if len(slow) < FEWEST:
         return float("nan")
     return float(0.5 * np.sqrt(np.pi * max(np.mean(crossed[slow] ** 2 - way[slow] ** 2), 0.0)))

@@ -22,7 +22,7 @@ def instead_of_a_mode(fit: Fit, believed_rates: tuple[float, ...], cause: Cause)
     if cause.id != NAMED or not believed_rates:
         return None
     structure, limit = fit.structure, FASTER * max(believed_rates)
-    pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
+    pad = fit.pad
     modes = [mode for mode in zip(pad.relaxation.shares, pad.relaxation.rates, strict=True) if mode[1] > limit]
     if not modes:
         return None

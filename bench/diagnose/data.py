@@ -31,7 +31,7 @@ SHORT = 1500  # samples that need no stand-in
 LEAST_SHARED = 1e-2  # of the noise's own square: what is shared and less changes nothing
 TARGET, MOST = 4000, 6000  # samples of the stand-in, where its blocks can be that long
 FASTEST, WIDEST = 0.12, 8.0  # growth of blocks; times what the travel within one may make of force
-FINELY = 2e-3  # of the travel, that a block spans at the most: in air nothing but inertia and friction tell of motion
+FINELY = 2e-3  # of the travel, that a block spans at the most: in air no stiffness says how finely
 
 
 @dataclass(frozen=True)

@@ -379,7 +379,7 @@ def _concluded(
         seconds=time.perf_counter() - begun,
         model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
         notes=list(m.notes),
-        doubts=doubts(m, search.believed.pad.pad, _pad_of(path.fits[0])),
+        doubts=doubts(m, search.believed.pad.pad, path.fits[0].pad),
         remainders=tests,
         name=m.name,
         seen_once=any(most_sure(all_effects()[c.id], search.reach.rich) < 1.0 for c in causes),
@@ -394,11 +394,6 @@ def _concluded(
         ranking=_ranking(path),
         rivals=[(t.id, model_of(believed, t.fit, prepared)) for t in (path.rivals[0][:RIVALS] if path.rivals else [])],
     )
-
-
-def _pad_of(fit: Fit) -> Pad:
-    numbers = fit.structure.pad
-    return numbers.at(fit.x[: len(numbers.coordinates)])
 
 
 def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:

@@ -37,7 +37,7 @@ def as_believed(short: Data, fit: Fit) -> Fit | None:
         return None
     values, cause, order = structure.values(fit.x), structure.causes[index], own.order
     end, names = len(structure.pad.coordinates), [p.name for p in cause.fitted]
-    pad, amend = structure.pad.at(fit.x[:end]), cause.form.amend
+    pad, amend = fit.pad, cause.form.amend
     assert amend is not None
     times = np.geomspace(0.3 * float(np.median(np.diff(short.time_s))), 3.0 * float(np.ptp(short.time_s)), TIMES)
     wanted = _relaxed(amend(pad, values[index]).relaxation, times)
@@ -95,7 +95,7 @@ def missing_told(fit: Fit, believed: Structure) -> Array:
         if cause.id != NAMED or cause.form.name != cause.effect.forms[0].name:
             continue
         values = structure.values(fit.x)
-        pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
+        pad = fit.pad
         modes = [*zip(pad.relaxation.shares, pad.relaxation.rates, strict=True), _mode(values[index])]
         best = left_over([float(np.log(rate)) for _, rate in modes], np.log(believed.pad.pad.relaxation.rates))
         if best == len(modes) - 1 or sum(share for share, _ in modes) >= 1.0:

@@ -10,6 +10,7 @@ from scipy.optimize import Bounds, minimize
 
 from bench.identify._kernel import accumulate
 from bench.identify.solver import minimise
+from sim.pad import Pad
 
 from .data import Data
 from .numbers import Structure
@@ -38,6 +39,12 @@ class Fit:
         x, s = self.x, self.structure
         inside = (x > s.lower) & (x < s.upper) & (np.diag(self.matrix) > 1e-9)
         return int(inside.sum())
+
+    @property
+    def pad(self) -> Pad:
+        """The pad with the numbers found."""
+        numbers = self.structure.pad
+        return numbers.at(self.x[: len(numbers.coordinates)])
 
     @property
     def of_run(self) -> Array:

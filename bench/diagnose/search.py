@@ -40,7 +40,7 @@ from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, repeatin
 Array = NDArray[np.float64]
 
 MANY_MORE = 2  # numbers of a shape beyond those of the plain one: then two plain causes are asked for in its place
-AS_LATE = 0.99  # of what the best takes: what makes the force late too and takes as much
+LATE_TOO = 0.99  # of what the best takes: what makes the force late too and takes as much
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 AS_WELL = 0.8  # the same, of a second cause of a kind beside the first
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
@@ -202,7 +202,7 @@ class Search(Sieve):
         """Of what makes the force late and takes as much, the one in front that does so where each sample counts: means
         over blocks smear what a delay keeps and a lag does not."""
         now, best = path.fits[-1], turn.ranked[0]
-        enough = AS_LATE * (now.chi2 - best.fit.chi2)
+        enough = LATE_TOO * (now.chi2 - best.fit.chi2)
         late = [t for t in turn.ranked[: 1 + COMPARED] if t.id in LATE and now.chi2 - t.fit.chi2 > enough]
         if best.id not in LATE or len(late) < 2 or self.short.size == self.prepared.full.size:
             return

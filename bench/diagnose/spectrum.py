@@ -37,7 +37,7 @@ def one_more_mode(at: Signatures, believed_rates: Sequence[float], cause: Cause)
     if cause.id != NAMED or cause.form.name != cause.effect.forms[0].name or order == 0:
         return None
     end = len(structure.pad.coordinates)
-    pad = structure.pad.at(fit.x[:end])
+    pad = fit.pad
     rate = next(p for p in cause.form.parameters if p.name == "rate")
     rates = np.geomspace(rate.lower, rate.upper, RATES)
 

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bench.recording.types import Measurement
 from sim.elastic import NoPad
 from sim.pad import Pad
-
-Array = NDArray[np.float64]
 
 MANY_TIMES = 10.0  # as stiff as was believed: no lab is off by so much
 ANOTHER_TIME = 30.0  # times as fast, each of the modes: one mode that the data hardly tell may go anywhere

@@ -17,7 +17,7 @@ from .refit import Fit
 def model_of(believed: Model, fit: Fit, prepared: Prepared, limit_N: float | None = None) -> dict[str, Any]:
     """Pad and effects with the fit's numbers and their standard errors; `limit_N`: a ceiling of the force."""
     structure = fit.structure
-    pad = structure.pad.at(fit.x[: len(structure.pad.coordinates)])
+    pad = fit.pad
     order = np.argsort(-np.array(pad.relaxation.rates), kind="stable")
     rates = [pad.relaxation.rates[i] for i in order]
     for i in range(1, len(rates)):
