@@ -209,8 +209,9 @@ class Search(Sieve):
         with ThreadPoolExecutor(WORKERS) as pool:
             whole = list(pool.map(lambda t: refit(self.prepared.full, t.fit.structure, t.fit.x, MORE, 1e-6), late))
         cost = [fit.chi2 + t.score - t.fit.chi2 for t, fit in zip(late, whole, strict=True)]
-        first = late[int(np.argmin(cost))]
-        if first is not best:
+        first, lead = late[int(np.argmin(cost))], late.index(best)
+        # of what all of them leave it tells nothing
+        if cost[lead] - min(cost) > BETTER * max(whole[lead].chi2 / self.effective, 1.0):
             turn.ranked = [first, *(t for t in turn.ranked if t is not first)]
             turn.found = self._lead(path, first)
 

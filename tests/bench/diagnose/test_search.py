@@ -162,14 +162,15 @@ def test_a_curve_through_points_that_leaves_nothing_stands_against_its_rivals_in
 
 
 @pytest.mark.parametrize(
-    ("lag", "delay", "first"),
+    ("lag", "delay", "samples", "first"),
     [
-        ((2200.0, 4590.0), (2220.0, 4570.0), "force_delay"),  # on the stand-in, and at full rate
-        ((2200.0, 4570.0), (2220.0, 4590.0), "sensor_lag"),
-        ((2200.0, 4590.0), (9220.0, 4570.0), "sensor_lag"),  # so far behind on the stand-in that nobody asks
+        ((2200.0, 4590.0), (2220.0, 4570.0), 4500.0, "force_delay"),  # on the stand-in, and at full rate
+        ((2200.0, 4570.0), (2220.0, 4590.0), 4500.0, "sensor_lag"),
+        ((2200.0, 4590.0), (2220.0, 4570.0), 1000.0, "sensor_lag"),  # both leave so much that it tells nothing
+        ((2200.0, 4590.0), (9220.0, 4570.0), 4500.0, "sensor_lag"),  # so far behind on the stand-in that nobody asks
     ],
 )
-def test_delay_and_lag_are_told_apart_where_each_sample_counts(monkeypatch, lag, delay, first):
+def test_delay_and_lag_are_told_apart_where_each_sample_counts(monkeypatch, lag, delay, samples, first):
     short, full = SimpleNamespace(size=4000), SimpleNamespace(size=30_000)
 
     def trial(id: str, chi2: float) -> Any:
@@ -179,7 +180,9 @@ def test_delay_and_lag_are_told_apart_where_each_sample_counts(monkeypatch, lag,
     monkeypatch.setattr(
         "bench.diagnose.search.refit", lambda data, structure, x, *_: SimpleNamespace(chi2=whole[structure], data=data)
     )
-    begun: Any = SimpleNamespace(prepared=SimpleNamespace(full=full), short=short, _lead=lambda path, best: best.id)
+    begun: Any = SimpleNamespace(
+        prepared=SimpleNamespace(full=full), short=short, effective=samples, _lead=lambda path, best: best.id
+    )
     path: Any = SimpleNamespace(fits=[SimpleNamespace(chi2=5e5)])
     other = trial("friction", 4e5)
     turn: Any = SimpleNamespace(ranked=[trial("sensor_lag", lag[0]), trial("force_delay", delay[0]), other], found="")
