@@ -64,7 +64,7 @@ def _tanks(path: Path, part: str) -> Measurement:
 def end_of_learning(m: Measurement) -> float:
     """Stamp at which `LEARNT_SHARE` of the force samples are past; of those below the surface, where the approach
     takes longer than that."""
-    pressed = np.flatnonzero(np.interp(m.force_time_s, m.position_time_s, m.position_mm) > 0)
+    pressed = np.flatnonzero(m.position_at_forces_mm() > 0)
     if len(pressed) < 2:
         raise InputError(m.name, "the position never passes the surface (0 mm): nothing is pressed")
     last = int(LEARNT_SHARE * len(m.force_time_s))

@@ -82,7 +82,7 @@ def _held(name: str, m: Measurement, plain: Model, extended: Model) -> Held:
     """Both models from rest over the measured motion; flagged samples count for both."""
     counted = m.counted()
     by_plain, by_extended = (likeness(model, m).force_N for model in (plain, extended))
-    position = np.interp(m.force_time_s, m.position_time_s, m.position_mm)
+    position = m.position_at_forces_mm()
     return Held(
         name, rms((m.force_N - by_plain)[counted]), rms((m.force_N - by_extended)[counted]),
         m.force_time_s, position, m.force_N, by_plain, by_extended, counted,

@@ -305,8 +305,7 @@ def _stuck(force: Array, but: Mask) -> Mask:
         noise = noise_steps(force, step)
         if p > STANDS:
             noise = np.fmin(noise, 0.5 * np.sqrt(np.pi) * (1.0 - p))
-        if p > STANDS or noise < HARDLY:  # it hardly leaves a step: in its middle a force stands long, but nothing
-            # leaps in the end
+        if noise < HARDLY:  # it hardly leaves a step: in its middle a force stands long, but nothing leaps in the end
             caught = (length >= _least(min(p, 0.97), len(force))) & _catches_up(force, first, length, step)
             p = float(np.clip(2.0 * norm.cdf(0.5 / max(noise, 1e-3)) - 1.0, p, 1.0 - 1e-12))
     else:

@@ -28,19 +28,17 @@ from .candidates import (
 from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
 from .felt_errors import felt_errors, redrawn
-from .late import LATE
 from .late_by_chance import late_by_chance_s
 from .numbers import Cause, cause_of, shapes_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import departed, families
-from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, repeating_first
+from .sieve import ALL, BETTER, CLOSE, COMPARED, FEW, LATER, MORE, WORKERS, Sieve, drawn, repeating_first
 
 Array = NDArray[np.float64]
 
 MANY_MORE = 2  # numbers of a shape beyond those of the plain one: then two plain causes are asked for in its place
-LATE_TOO = 0.99  # of what the best takes: what makes the force late too and takes as much
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 AS_WELL = 0.8  # the same, of a second cause of a kind beside the first
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
@@ -48,14 +46,12 @@ CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and s
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 A_SHAPE = 0.1  # of what is left beyond the noise, that another shape of a cause takes where no further cause pays
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
-BETTER = 10.0  # Δχ², times what the best leaves over what noise does: for less no cause is exchanged
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MOST_CAUSES = 3
 SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
 RIVALS = 2  # beside the best, that are asked for their best shapes
 LONG_WAVES = 3  # starts of a wave that is longer than those sought
-COMPARED = 5  # rivals of a cause that is compared anew
 LATER_BY_CHANCE = 1.3  # times what was known of it
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
 
@@ -199,21 +195,10 @@ class Search(Sieve):
         return None
 
     def _told_at_full_rate(self, path: Path, turn: _Turn) -> None:
-        """Of what makes the force late and takes as much, the one in front that does so where each sample counts: means
-        over blocks smear what a delay keeps and a lag does not."""
-        now, best = path.fits[-1], turn.ranked[0]
-        enough = LATE_TOO * (now.chi2 - best.fit.chi2)
-        late = [t for t in turn.ranked[: 1 + COMPARED] if t.id in LATE and now.chi2 - t.fit.chi2 > enough]
-        if best.id not in LATE or len(late) < 2 or self.short.size == self.prepared.full.size:
-            return
-        with ThreadPoolExecutor(WORKERS) as pool:
-            whole = list(pool.map(lambda t: refit(self.prepared.full, t.fit.structure, t.fit.x, MORE, 1e-6), late))
-        cost = [fit.chi2 + t.score - t.fit.chi2 for t, fit in zip(late, whole, strict=True)]
-        first, lead = late[int(np.argmin(cost))], late.index(best)
-        # of what all of them leave it tells nothing
-        if cost[lead] - min(cost) > BETTER * max(whole[lead].chi2 / self.effective, 1.0):
-            turn.ranked = [first, *(t for t in turn.ranked if t is not first)]
-            turn.found = self._lead(path, first)
+        """Delay, lag and resonance in the order that each sample tells."""
+        best, turn.ranked = turn.ranked[0], self.late_first(path.fits[-1], turn.ranked)
+        if turn.ranked[0] is not best:
+            turn.found = self._lead(path, turn.ranked[0])
 
     def _note(self, path: Path, turn: _Turn) -> None:
         stood = [*turn.ranked, *turn.small]

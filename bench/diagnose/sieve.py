@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 
 FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
+LATE_TOO = 0.99  # of what the best takes: what makes the force late too and takes as much
+BETTER = 10.0  # Δχ², times what the best leaves over what noise does: for less no cause is exchanged
+COMPARED = 5  # rivals of a cause that is compared anew
 AS_LATE = 0.9  # of the best gain: what makes the force late and takes so much brings its look-alikes in
 FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the least
 HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
@@ -180,6 +183,23 @@ class Sieve:
                 others = [*self._relaxing_as(ranked[0], again), *([out[id_]] if id_ in out else [])]
                 out[id_] = min([again, *others], key=lambda t: t.score)
         return list(out.values())
+
+    def late_first(self, before: Fit, ranked: list[Trial]) -> list[Trial]:
+        """With that one in front, of what makes the force late and takes as much as the first, which does so where each
+        sample counts: means over blocks smear what a delay keeps and a lag does not."""
+        best, full = ranked[0], self.prepared.full
+        enough = LATE_TOO * (before.chi2 - best.fit.chi2)
+        late = [t for t in ranked[: 1 + COMPARED] if t.id in LATE and before.chi2 - t.fit.chi2 > enough]
+        if best.id not in LATE or len(late) < 2 or self.short.size == full.size:
+            return ranked
+        with ThreadPoolExecutor(WORKERS) as pool:
+            whole = list(pool.map(lambda t: refit(full, t.fit.structure, t.fit.x, MORE, 1e-6), late))
+        cost = [fit.chi2 + t.score - t.fit.chi2 for t, fit in zip(late, whole, strict=True)]
+        # what all of them leave tells nothing of which it is
+        if cost[0] - min(cost) <= BETTER * max(whole[0].chi2 / self.effective, 1.0):
+            return ranked
+        first = late[int(np.argmin(cost))]
+        return [first, *(t for t in ranked if t is not first)]
 
     def _promising(self, by_id: dict[str, list[Start]], least: float) -> list[str]:
         """Ids whose first-order signature takes anything worth while, and those that have none."""

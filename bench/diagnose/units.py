@@ -19,14 +19,15 @@ def doubts(m: Measurement, believed: Pad, refitted: Pad) -> list[str]:
     if isinstance(believed.law, NoPad):
         return []
     counted = m.counted()
-    depth_mm = np.interp(m.force_time_s, m.position_time_s, m.position_mm)
-    deep = counted & (depth_mm > DEEPEST * float(depth_mm[counted].max(initial=0.0)))
+    depth_mm = m.position_at_forces_mm()
+    deepest_mm = float(depth_mm[counted].max(initial=0.0))
+    deep = counted & (depth_mm > DEEPEST * deepest_mm)
     if deep.any() and float(np.median(m.force_N[deep])) < -PUSHED_BACK * float(np.abs(m.force_N[counted]).max()):
         return [
             "the force is negative where the pad is pressed the most: is its sign turned? (a push counts as positive)"
         ]
     out = []
-    stiffer = _stiffer(believed, refitted, float(depth_mm[counted].max(initial=0.0)))
+    stiffer = _stiffer(believed, refitted, deepest_mm)
     if max(stiffer, 1.0 / stiffer) > MANY_TIMES:
         out.append(
             f"to fit, the pad was made {_times(stiffer, 'stiff', 'soft')} as believed: are positions in mm and forces "

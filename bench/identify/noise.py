@@ -102,7 +102,7 @@ def _resolution(y: Array) -> float:
 
 def stiffness_along(m: Measurement) -> Array:
     """|dF/dδ|, N/mm, at every force sample, model-free: slopes over moves, median by depth; 0 above the surface."""
-    depth = np.interp(m.force_time_s, m.position_time_s, m.position_mm)
+    depth = m.position_at_forces_mm()
     reach = float(np.ptp(depth))
     if reach == 0:
         return np.zeros(len(depth))

@@ -76,7 +76,7 @@ def findings(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = Tru
 def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findings:
     every = Findings()
     out = every.notes
-    force, depth = m.force_N, np.interp(m.force_time_s, m.position_time_s, m.position_mm)
+    force, depth = m.force_N, m.position_at_forces_mm()
     top = float(np.abs(force).max())
     deepest = depth > 0.7 * depth.max()
     if float(np.mean(force[deepest])) < -3 * noise.force_N:

@@ -13,8 +13,6 @@ import numpy as np
 from bench.errors import InputError
 from bench.recording.types import Measurement
 
-from ._kernel import Array
-
 
 def force_zeroed(m: Measurement, first_samples: int) -> Measurement:
     """Subtract the mean force of the first samples, out of contact. Raises InputError for fewer than 3."""
@@ -27,7 +25,7 @@ def force_zeroed(m: Measurement, first_samples: int) -> Measurement:
 
 def baseline_removed(m: Measurement, contact_mm: float) -> Measurement:
     """Subtract a straight line over position, fitted where the position is above `contact_mm` on the way in."""
-    depth = _at_force(m)
+    depth = m.position_at_forces_mm()
     until = int(np.argmax(depth >= contact_mm)) if np.any(depth >= contact_mm) else len(depth)
     if until < 10:
         raise InputError(m.name, f"the data do not start out of contact (above {contact_mm:.4g} mm)")
@@ -44,7 +42,7 @@ def surface_at(m: Measurement, contact_mm: float) -> Measurement:
 
 def indentation(m: Measurement, stiffness_N_mm: float) -> Measurement:
     """Take the bending of a series spring of known stiffness (a cantilever, a frame) off the position."""
-    depth = _at_force(m) - m.force_N / stiffness_N_mm
+    depth = m.position_at_forces_mm() - m.force_N / stiffness_N_mm
     note = f"The bending of a series spring of {stiffness_N_mm:.4g} N/mm was taken off the position."
     return replace(m, position_time_s=m.force_time_s, position_mm=depth, notes=[*m.notes, note])
 
@@ -55,7 +53,7 @@ def contact_of(m: Measurement) -> float:
     The level and its scatter are those of the first sixth of the way in; contact is where the force last crosses five
     scatters above it before it reaches a tenth of its greatest rise. Raises InputError where it never rises.
     """
-    depth = _at_force(m)
+    depth = m.position_at_forces_mm()
     deepest = int(np.argmax(depth >= depth[0] + 0.98 * (depth.max() - depth[0])))
     if deepest < 60:
         raise InputError(m.name, "there is no way in to find a surface on")
@@ -69,7 +67,3 @@ def contact_of(m: Measurement) -> float:
     up = int(np.argmax(rise > max(0.1 * rise.max(), 5 * scatter)))
     below = np.flatnonzero(rise[:up] <= 5 * scatter)
     return float(depth[below[-1] if len(below) else 0])
-
-
-def _at_force(m: Measurement) -> Array:
-    return np.asarray(np.interp(m.force_time_s, m.position_time_s, m.position_mm))

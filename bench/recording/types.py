@@ -143,6 +143,10 @@ class Measurement:
     stamp_std_s: float = 0.0
     """By how much all stamps of the position may be early or late against those of the force, standard deviation."""
 
+    def position_at_forces_mm(self) -> Array:
+        """The position at the stamps of the forces (m,), linear between its own."""
+        return np.asarray(np.interp(self.force_time_s, self.position_time_s, self.position_mm))
+
     def counted(self) -> NDArray[np.bool_]:
         """Which force samples cost something, (m,): from `fit_from_s` to `fit_to_s`, and none that is doubtful."""
         counted = (self.force_time_s >= self.fit_from_s) & (self.force_time_s <= self.fit_to_s)

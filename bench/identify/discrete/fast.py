@@ -198,7 +198,7 @@ class Fast:
 def _samples(data: Data, structure: Structure, ramps: list[list[Ramp]], which: str) -> _Phase:
     pieces = []
     for m, several in zip(data.measurements, ramps, strict=True):
-        depth = np.interp(m.force_time_s, m.position_time_s, m.position_mm)
+        depth = m.position_at_forces_mm()
         counted = m.counted()
         for ramp in several:
             inside = (m.force_time_s >= ramp.begin_s) & (m.force_time_s <= ramp.end_s) & (depth > 0)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from bench.diagnose import diagnose
 from bench.recording.types import Measurement
 from sim.model import Model
+from tests.truth.effects.plant import followed
 from tests.truth.effects.third_machine import _sliding
 from tests.truth.motion import Path
 
@@ -43,12 +43,7 @@ def started_and_stopped(seed: int) -> Measurement:
         path = path.to(float(target), float(rng.uniform(25.0, 80.0))).hold(0.6)
     motion = path.motion()
     fine = np.arange(0.0, motion.duration_s, FINE_S)
-    keeps = float(np.exp(-FINE_S / SERVO_S))
-    begin = motion.position(fine[0])
-    x = motion.position(fine) - begin
-    for _ in range(2):
-        x = lfilter([1.0 - keeps], [1.0, -keeps], x)
-    x += begin
+    x = followed(fine, motion.position(fine), SERVO_S)
     force = 1e-3 * MASS_KG * np.gradient(np.gradient(x, FINE_S), FINE_S)
     t = np.arange(0.0, motion.duration_s - 0.01, 1e-3)
     at = np.interp(t, fine, x) + 3e-4 * rng.standard_normal(len(t))

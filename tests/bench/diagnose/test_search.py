@@ -26,6 +26,9 @@ from sim.relaxation import Relaxation
 from tests.bench.diagnose.small import measurement
 from tests.truth.cases import Case, draw_case
 
+QUIET: dict[str, Any] = {"jitter": "none", "noise_kind": "white", "own_clock": False, "law": "exponential"}
+"""Of a case that shows little but what is hidden in it."""
+
 
 def begun(c: Case) -> tuple[Search, Fit]:
     """A search, and the believed structure refitted."""
@@ -34,6 +37,13 @@ def begun(c: Case) -> tuple[Search, Fit]:
     structure = believed_structure(Model.from_dict(c.believed), p)
     search = Search(p, structure, lambda _: None)
     return search, search.base([structure.pad.x()])
+
+
+def in_two_shapes(c: Case, id: str) -> tuple[Search, Fit, Fit]:
+    """A search, and the cause joined alone: in the shape that is found first, and in the best of those beside it."""
+    search, base = begun(c)
+    first = search.ranked(base, only=[id])[0].fit
+    return search, first, search.recurved(first)
 
 
 @pytest.mark.long
@@ -178,11 +188,12 @@ def test_delay_and_lag_are_told_apart_where_each_sample_counts(monkeypatch, lag,
 
     whole = {"sensor_lag": lag[1], "force_delay": delay[1]}
     monkeypatch.setattr(
-        "bench.diagnose.search.refit", lambda data, structure, x, *_: SimpleNamespace(chi2=whole[structure], data=data)
+        "bench.diagnose.sieve.refit", lambda data, structure, x, *_: SimpleNamespace(chi2=whole[structure], data=data)
     )
     begun: Any = SimpleNamespace(
         prepared=SimpleNamespace(full=full), short=short, effective=samples, _lead=lambda path, best: best.id
     )
+    begun.late_first = lambda before, ranked: Search.late_first(begun, before, ranked)
     path: Any = SimpleNamespace(fits=[SimpleNamespace(chi2=5e5)])
     other = trial("friction", 4e5)
     turn: Any = SimpleNamespace(ranked=[trial("sensor_lag", lag[0]), trial("force_delay", delay[0]), other], found="")
@@ -278,10 +289,8 @@ def test_a_form_with_a_long_way_to_go_is_not_left_behind(id, shape, form, seeds,
     """Each form of a family is carried on for itself: here those that a part of the load or the time goes into."""
     found = []
     for seed in range(seeds):
-        c = draw_case(seed, (id,), 2.0, shape, protocol="staircase", rate_hz=150.0, jitter="none",
-                      noise_kind="white", noise_N=0.003, own_clock=False, law="exponential")  # fmt: skip
-        search, base = begun(c)
-        fit = search.recurved(search.ranked(base, only=[id])[0].fit)
+        c = draw_case(seed, (id,), 2.0, shape, protocol="staircase", rate_hz=150.0, noise_N=0.003, **QUIET)
+        search, _, fit = in_two_shapes(c, id)
         found.append(fit.structure.causes[0].form.name == form and fit.chi2 < 1.3 * search.expected)
     assert sum(found) >= least
 
@@ -289,11 +298,8 @@ def test_a_form_with_a_long_way_to_go_is_not_left_behind(id, shape, form, seeds,
 @pytest.mark.parametrize("seed", [0, 5, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2, 3, 4, 6, 7))])
 def test_damage_by_what_is_dissipated_is_no_other_damage(seed):
     """It goes on in holds, which no travel does; another form leaves some times as much."""
-    c = draw_case(seed, ("damage",), 2.0, "by_loss", protocol="random_steps", rate_hz=150.0, jitter="none",
-                  noise_kind="white", noise_N=0.005, own_clock=False, law="exponential")  # fmt: skip
-    search, base = begun(c)
-    other = search.ranked(base, only=["damage"])[0].fit
-    loss = search.recurved(other)
+    c = draw_case(seed, ("damage",), 2.0, "by_loss", protocol="random_steps", rate_hz=150.0, noise_N=0.005, **QUIET)
+    search, other, loss = in_two_shapes(c, "damage")
     assert loss.structure.causes[0].form.name == "loss"
     assert loss.chi2 - search.expected < 0.5 * (other.chi2 - search.expected)
 
@@ -302,11 +308,9 @@ def test_damage_by_what_is_dissipated_is_no_other_damage(seed):
 def test_a_course_in_time_that_few_moves_tell_of_is_one_all_the_same(seed):
     """Between the moves its waves go as far as they may, but for what is expected of them. (Of seeds 0 to 39, those in
     which one ended at a bound of 0.6, where a shape is not believed.)"""
-    c = draw_case(seed, ("force_delay",), 2.0, "self_similar", protocol="staircase", rate_hz=200.0, jitter="none",
-                  noise_kind="white", noise_N=0.003, own_clock=False, law="exponential")  # fmt: skip
-    search, base = begun(c)
-    constant = search.ranked(base, only=["force_delay"])[0].fit
-    wandering = search.recurved(constant)
+    id = "force_delay"
+    c = draw_case(seed, (id,), 2.0, "self_similar", protocol="staircase", rate_hz=200.0, noise_N=0.003, **QUIET)
+    search, constant, wandering = in_two_shapes(c, id)
     assert wandering.structure.causes[0].form.name == "wandering"
     assert wandering.chi2 - search.expected < 0.8 * (constant.chi2 - search.expected)
 
