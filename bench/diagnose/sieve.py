@@ -187,11 +187,11 @@ class Sieve:
     def late_first(self, before: Fit, ranked: list[Trial]) -> list[Trial]:
         """With that one in front, of what makes the force late and takes as much as the first, which does so where each
         sample counts: means over blocks smear what a delay keeps and a lag does not."""
-        best, full = ranked[0], self.prepared.full
-        enough = LATE_TOO * (before.chi2 - best.fit.chi2)
+        enough = LATE_TOO * (before.chi2 - ranked[0].fit.chi2)
         late = [t for t in ranked[: 1 + COMPARED] if t.id in LATE and before.chi2 - t.fit.chi2 > enough]
-        if best.id not in LATE or len(late) < 2 or self.short.size == full.size:
+        if ranked[0].id not in LATE or len(late) < 2 or self.short.size == self.prepared.full.size:
             return ranked
+        full = self.prepared.full
         with ThreadPoolExecutor(WORKERS) as pool:
             whole = list(pool.map(lambda t: refit(full, t.fit.structure, t.fit.x, MORE, 1e-6), late))
         cost = [fit.chi2 + t.score - t.fit.chi2 for t, fit in zip(late, whole, strict=True)]
