@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FINEST_S, COARSEST_S = 1e-3, 0.05
-"""Grid of the prediction: 1 kHz where it moves fast, coarser where little happens."""
+"""Grid of the prediction, as it is drawn: 1 kHz where it moves fast, coarser where little happens."""
 
 FINE_MM = 0.002
 GROWTH = 1.1
@@ -66,17 +66,17 @@ class TooLong(Exception):
         self.index, self.total_s = index, total_s
 
 
-def predict(plan: Plan, believed: Model | None) -> Prediction:
+def predict(plan: Plan, believed: Model | None, finer: float = 1.0) -> Prediction:
     """Run the plan on the believed pad; without one, force targets go as deep as the limits allow.
 
-    Raises `TooLong`.
+    `finer`: times as fine a grid as is drawn. Raises `TooLong`.
     """
-    return _Timeline(plan, believed).run()
+    return _Timeline(plan, believed, finer).run()
 
 
 class _Timeline:
-    def __init__(self, plan: Plan, believed: Model | None) -> None:
-        self.plan, self.believed = plan, believed
+    def __init__(self, plan: Plan, believed: Model | None, finer: float) -> None:
+        self.plan, self.believed, self.finer = plan, believed, finer
         by_force = any(s.kind in ("force_ramp", "force_hold") for s in plan.segments)
         self.plant: Plant | None = believed.plant() if believed is not None and by_force else None
         self.times: list[Array] = [np.zeros(1)]
@@ -121,7 +121,7 @@ class _Timeline:
         elif segment.kind == "force_hold" and self.plant is not None:
             self._force_hold(index, segment, self.plant)
         else:
-            self._append(*_hold(segment.duration_s, self.at_mm))
+            self._append(*_hold(segment.duration_s, self.at_mm, self.finer))
 
     def _must_end(self, index: int, duration_s: float) -> None:
         """Before there is a grid for it."""
@@ -147,7 +147,7 @@ class _Timeline:
         self.at_mm = float(positions[-1])
 
     def _ramp(self, profile: Profile) -> None:
-        offsets = _ramp_grid(profile)
+        offsets = _ramp_grid(profile, self.finer)
         self._append(offsets, profile.position(offsets))
 
     def _force_ramp(self, index: int, segment: Segment) -> None:
@@ -158,7 +158,7 @@ class _Timeline:
             self.bounded = True
             self._ramp(profile)
             return
-        grid = _ramp_grid(profile)
+        grid = _ramp_grid(profile, self.finer)
         before, seen_s = 0.0, math.nan
         used = 0
         for offset, position in zip(grid.tolist(), profile.position(grid).tolist(), strict=True):
@@ -214,24 +214,24 @@ class _Timeline:
         return max(float(law.stiffness(max(self.at_mm, 0.05))), 0.01)
 
 
-def _ramp_grid(profile: Profile) -> Array:
+def _ramp_grid(profile: Profile, finer: float) -> Array:
     """Times after the start, the end included; empty for a ramp of no length."""
     if profile.duration_s == 0.0:
         return np.empty(0)
     step = min(max(FINEST_S, FINE_MM / profile.peak_speed_mm_s), COARSEST_S)
-    count = max(8, math.ceil(profile.duration_s / step))
+    count = max(8, math.ceil(finer * profile.duration_s / step))
     return np.linspace(0.0, profile.duration_s, count + 1)[1:]
 
 
-def _hold(duration_s: float, at_mm: float) -> tuple[Array, Array]:
+def _hold(duration_s: float, at_mm: float, finer: float) -> tuple[Array, Array]:
     if duration_s <= 0.0:
         return np.empty(0), np.empty(0)
     offsets: list[float] = []
-    t, step = 0.0, FINEST_S
-    while t + 1.5 * step < duration_s and step < COARSEST_S:
+    t, step, coarsest = 0.0, FINEST_S / finer, COARSEST_S / finer
+    while t + 1.5 * step < duration_s and step < coarsest:
         t += step
         offsets.append(t)
         step *= GROWTH
-    count = max(1, math.ceil((duration_s - t) / COARSEST_S))
+    count = max(1, math.ceil((duration_s - t) / coarsest))
     grid = np.concatenate([offsets, np.linspace(t, duration_s, count + 1)[1:]])
     return grid, np.full(grid.size, at_mm)

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from bench.recording.types import Array
     from sim.model import Model
 
+FINER = 10.0  # than the preview, so that what happens between samples is there
+MOST = 2_000_000  # samples, of a protocol of hours
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
@@ -37,9 +40,14 @@ def main(args: argparse.Namespace) -> int:
 
 
 def _over_protocol(args: argparse.Namespace, model: Model) -> int:
+    """Sampled as the bench would sample it, of a motion and a force that go on between the samples."""
+    import numpy as np
+
     from bench.config import load_bench
+    from bench.predict import predict
     from bench.preflight import check
     from bench.protocol import load_protocol
+    from bench.rates import motor_rate_Hz
     from bench.recording import write_csv
 
     protocol = load_protocol(args.protocol)
@@ -49,11 +57,15 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
     preflight = check(protocol, bench, model)
     for problem in preflight.errors:
         print(f"note: on bench '{bench.name}' this would be refused: {problem}")
-    prediction = preflight.prediction
-    _must_be_finite(args.model, prediction.force_N)
-    time_s = prediction.time_s
-    write_csv(args.out, time_s, prediction.position_mm, time_s, prediction.force_N)
-    print(f"wrote {args.out}: {time_s.size} samples over {time_s[-1]:.1f} s")
+    _must_be_finite(args.model, preflight.prediction.force_N)
+    fine = predict(preflight.plan, model, FINER)
+    duration_s = float(fine.time_s[-1])
+    rate_Hz = min(motor_rate_Hz(bench, protocol.sampling.motor), MOST / duration_s)
+    time_s = np.arange(int(duration_s * rate_Hz) + 1) / rate_Hz
+    position = np.interp(time_s, fine.time_s, fine.position_mm)
+    force = model.simulate_at(fine.time_s, fine.position_mm, time_s)
+    write_csv(args.out, time_s, position, time_s, force)
+    print(f"wrote {args.out}: {time_s.size} samples over {duration_s:.1f} s, without noise")
     return EXIT_DONE
 
 

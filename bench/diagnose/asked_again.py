@@ -13,6 +13,7 @@ from bench.recording.types import Measurement
 
 from .channel import FEW, Faults, far, not_of_the_motion, of_the_model, resting, runs, standing_off, strays
 from .data import Prepared, prepare
+from .noise import least_N
 from .path import Path
 from .pulses import pulses
 from .refit import Fit, force_at, onto
@@ -24,7 +25,9 @@ Mask = NDArray[np.bool_]
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
 AGAIN = 3  # samples of one value that a force on its way does not have
+GONE = 2  # samples of them
 JUMP = 0.5  # of the way a force has gone while its channel stayed
+LEAST = 20.0  # times the least noise, that a stray is off by where there is none: moments of contact stand off too
 STEPS, DEVIATIONS = 2.0, 8.0  # of the channel, and of its noise: so far a force has gone that shows none of it
 
 
@@ -53,8 +56,10 @@ def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask
     for begin, count in zip(first[length >= AGAIN].tolist(), length[length >= AGAIN].tolist(), strict=True):
         run = slice(begin, begin + count)
         way_N = float(np.ptp(modelled_N[run]))
+        left = np.abs(modelled_N[run] - modelled_N[begin]) > far
         jump_N = float(abs(force_N[min(begin + count, len(force_N) - 1)] - force_N[begin]))
-        if way_N > far and jump_N > JUMP * way_N and force_N[begin] not in ends and not but[run].any():
+        # gone in the last of them alone, it may be late by a sample
+        if left.sum() >= GONE and jump_N > JUMP * way_N and force_N[begin] not in ends and not but[run].any():
             # on its way a force is within a step for some samples before; half of them, on the average, are of this run
             passing = int(0.5 * count * step_N / way_N)
             out[begin + 1 + passing : begin + count] = True
@@ -125,6 +130,8 @@ def _strays_again(
     outlier &= ~of_the_model(modelled, errors, outlier)
     pulsed = _in_holds_too(at_rest, pulses(told, known, step_N))
     outlier |= pulsed
+    if prepared.noise.force_N <= least_N(m):
+        outlier &= np.abs(told) > LEAST * least_N(m)
     if outlier.sum() < FEW and not suspect.any():
         outlier &= at_rest  # one or two in moves, in a channel without strays, are at the motion's corners
     if np.array_equal(outlier, flags.outlier):

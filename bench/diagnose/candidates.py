@@ -245,9 +245,9 @@ class Signatures:
         size = 0.3 * (abs(amplitude.typical) or 1.0)
         if size > amplitude.upper:
             size = 0.5 * amplitude.upper
-        return self._clear(self.data.whitened(self._change(cause.with_start(**{amplitude.name: size}))) / size)
+        return self._clear(self.data.whitened(self.change(cause.with_start(**{amplitude.name: size}))) / size)
 
-    def _change(self, cause: Cause) -> Array:
+    def change(self, cause: Cause) -> Array:
         """What a cause adds to the force (n,), N, all else as it is."""
         structure = self.fit.structure.with_cause(cause)
         added = structure.x(self.fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
@@ -268,7 +268,7 @@ class Signatures:
 
     def whole(self, cause: Cause) -> float:
         """χ² that a cause takes as it stands, the pad's numbers free to first order; −inf where it makes no plant."""
-        change = self._change(cause)
+        change = self.change(cause)
         if not np.isfinite(change).all():
             return -np.inf
         column = self._clear(self.data.whitened(change))

@@ -19,7 +19,7 @@ from sim.jit import compiled
 
 from .coarse import rounded
 from .hum import Line, find
-from .noise import Colour, ForceNoise, force_noise, hold_errors
+from .noise import Colour, ForceNoise, force_noise, hold_errors, least_N
 from .whiten import Whitening, whitening
 
 Array = NDArray[np.float64]
@@ -270,13 +270,14 @@ def prepare(m: Measurement, good: Mask) -> Prepared:
     sample_s = float(np.median(np.diff(m.force_time_s)))
     begins_s = float(m.position_time_s[0])
     line = find(begins_s, hold_errors(m, good), m.force_time_s, m.force_N)
+    line = None if line is not None and line.amplitude_N < least_N(m) else line
     taken_N = np.zeros(len(m.force_N))
     if line is not None:
         taken_N = line.force_N(m.force_time_s - begins_s, m.force_N)
         m = replace(m, force_N=m.force_N - taken_N)
     motion = felt(m.position_time_s, m.position_mm)
     noise = force_noise(m, good)
-    sigma_force = max(noise.force_N, rounded(m.force_N[good], resolution(m.force_N)), 1e-9)
+    sigma_force = max(noise.force_N, rounded(m.force_N[good], resolution(m.force_N)), least_N(m))
     grid, where = union(motion.time_s, m.force_time_s)
     position = motion.at(grid)
     stiffness = stiffness_along(m)

@@ -20,7 +20,7 @@ from sim.pad import Pad
 
 from .asked_again import asked_again, with_pulses
 from .candidates import CHANNEL
-from .channel import Faults, faults, not_of_the_motion
+from .channel import Faults, faults, not_of_the_motion, without_noise
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS, beyond_limit, of_slow_force, within_bounds
@@ -39,7 +39,7 @@ from .spread import covariance
 from .swing import Swing
 from .swing import find as swinging
 from .units import doubts
-from .verdict import chain, excesses, explains, found, no_size, ordered, seen, sureness, told_size, without
+from .verdict import chain, excesses, explains, floor_told, found, no_size, ordered, seen, sureness, told_size, without
 from .way import most_sure
 from .write import model_of
 
@@ -60,6 +60,7 @@ NEARLY_ALL = 0.9  # of the error beyond the noise
 UNTOLD = 2.0  # times the square that the belief leaves: then its end cannot be foretold
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
 SAME_LINE = 0.01  # of its frequency
+QUIET = 0.5  # of the least noise that a load cell has
 FADED = 0.25  # of its size as found
 SETTLED_S = 0.15  # after a move
 RIVALS = 4  # models of the best single causes that are kept
@@ -73,7 +74,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     begun = time.perf_counter()
     tell = progress or (lambda _: None)
     tell("reading the channels")
-    flags = not_of_the_motion(m, with_pulses(m, faults(m.force_N)))
+    flags = not_of_the_motion(m, with_pulses(m, without_noise(m, faults(m.force_N))))
     prepared = prepare(m, flags.good)
     structure = believed_structure(believed, prepared)
     search = Search(prepared, structure, tell, ["saturation"] if flags.saturated.any() else [])
@@ -360,6 +361,8 @@ def _concluded(
         verdict = "explained" if explains(left, causes) else "unexplained"
     else:
         verdict = "unexplained" if told and excess[0] > TOLD * floor**2 else "consistent"
+    held_out_N = float(np.sqrt(squares[0] + apart)), float(np.sqrt(squares[-1]))
+    floor = min(float(np.sqrt(prepared.floor_N**2 - prepared.felt_floor_N**2)), floor)
     saturated = flags.saturated.copy()
     saturated[prepared.kept] |= beyond_limit(raw, whole[1])[at]
     flags = replace(flags, saturated=saturated)
@@ -370,11 +373,11 @@ def _concluded(
         verdict=verdict,
         causes=causes,
         left=float(left),
-        noise_floor=min(float(np.sqrt(prepared.floor_N**2 - prepared.felt_floor_N**2)), floor),
+        noise_floor=floor_told(*held_out_N, left, floor) if causes else floor,
         rmse_before=float(np.sqrt(np.mean((raw.force_N - before)[at][inside] ** 2))),
         rmse_after=float(np.sqrt(np.mean(residual[at][good] ** 2))),
-        held_out_before=float(np.sqrt(squares[0] + apart)),
-        held_out_after=float(np.sqrt(squares[-1])),
+        held_out_before=held_out_N[0],
+        held_out_after=held_out_N[1],
         flagged_fraction=float(flagged.mean()),
         seconds=time.perf_counter() - begun,
         model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
@@ -402,6 +405,8 @@ def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:
     for s in holds(full.time_s, full.position_mm):
         still[s.start : s.stop] = full.time_s[s] > full.time_s[s.start] + SETTLED_S
     at = prepared.at[(full.weight[prepared.at] > 0) & still[prepared.at]]
+    if len(at) and np.std(residual_N[at]) < QUIET * prepared.noise.force_N:
+        return None  # of a simulation without noise
     return swinging(full.time_s[at], residual_N[at], prepared.sample_s)
 
 

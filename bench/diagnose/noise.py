@@ -36,6 +36,7 @@ WINDOW_S, SHORTEST = 0.4, 24  # in which noise is compared with noise; samples
 CHANCE = 1e-3  # that a window of noise alone is left out
 TAILS = 1.5  # times more than Gaussian noise does a window of heavy-tailed noise vary
 STEADY = 0.02  # relative doubt of every level: no noise is exactly of this form
+FINEST, NEARLY_ALL = 2e-5, 0.99  # of the force that nearly all samples are below
 MISFIT = 2.0  # times better must colour make the fit of noise with structure beside it
 COLOURED, PAYS = 3.0, 20.0  # twice the log-likelihood by which colour, and structure beside the noise, must better it
 
@@ -64,6 +65,11 @@ class ForceNoise:
 
 Part = tuple[Array, Array, Array]
 """Of one hold: stamps, errors about a smooth curve, and the orthonormal basis that was taken out."""
+
+
+def least_N(m: Measurement) -> float:
+    """Noise, N, below which no load cell is: less are the digits of a simulation that has none."""
+    return max(FINEST * float(np.quantile(np.abs(m.force_N), NEARLY_ALL)), 1e-9)
 
 
 def hold_errors(m: Measurement, good: Mask) -> list[Part]:
@@ -201,7 +207,7 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
         return mean(_expected(parts, levels, complex(turn) if frequency_Hz else float(turn.real)))
 
     plain, found = mean(white), mean([level.square for level in levels])
-    if len(found) < 3:
+    if len(found) < 3 or not found.all():  # a channel without noise stands still in air
         return ForceNoise(float(np.sqrt(max(found[0] / plain[0], 1e-300))), Colour(), True)
     weight = 1.0 / (1.0 / counts[counts >= 3.0] + STEADY**2)
     memories = [0.0, *np.geomspace(0.5 * sample_s, max(MEMORY_S, sample_s), 20).tolist()]

@@ -27,6 +27,7 @@ FEW, TRIED = 3, 2  # steps of the best starts
 NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
 AS_GOOD = 4.0  # Δχ² by which one that is near to what was believed may be worse
+LESS = 0.5  # of what noise leaves: so little only a simulation without noise does, and no shape is told by it
 LEFT = 1.03  # times the noise power: what leaves more may have a period beyond those sought
 EDGE = 1e-6  # within which a coordinate is at its bound
 WORKERS = 2
@@ -91,7 +92,7 @@ def scores(short: Data, members: Sequence[Member]) -> Array:
 def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
     """The fit with each of its causes in the best of its shapes; `own`: causes at the begin that stay as they are."""
     lead, kept = stand_in(short, fit)
-    if len(kept) < len(fit.structure.causes):
+    if len(kept) < len(fit.structure.causes) or lead.chi2 < LESS * np.count_nonzero(short.weight > 0):
         return fit
     lead = taken = replace(lead, x=missing_told(lead, lead.structure))
     for index in range(own, len(kept)):

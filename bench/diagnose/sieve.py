@@ -16,6 +16,7 @@ from .candidates import Reach, Signatures, Start, forms, starts
 from .dashpot import instead_of_a_mode
 from .data import Data, Prepared
 from .evidence import believable, penalty, unexplained
+from .in_air import told_in_air
 from .late import LATE, as_late, lateness_s
 from .numbers import Cause, Structure, cause_of
 from .path import Trial
@@ -39,6 +40,7 @@ NEAR = 2.0  # times χ² before: another law that is no farther off after a few 
 KNEES = ("soft",)  # forms that say more than that the greatest forces are at a ceiling
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
 WORKERS = 2  # threads: the plant runs without Python's lock
+LESS = 0.5  # of what noise leaves: so little only a simulation without noise does
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 LIMIT = 24.0  # Δχ² by which one with a number at its bound must be better: it is another cause's limit
@@ -216,7 +218,10 @@ class Sieve:
         causes = [instead_of_a_mode(at.fit, rates, cause_of(*pair)) for pair in pairs]
         out = [(cause.id, Start(cause, np.inf, believed)) for cause in causes if cause is not None]
         more = [one_more_mode(at, rates, cause_of(*pair)) for pair in pairs]
-        return [*out, *((cause.id, Start(cause, np.inf, pad)) for cause, pad in (m for m in more if m is not None))]
+        out += [(cause.id, Start(cause, np.inf, pad)) for cause, pad in (m for m in more if m is not None)]
+        asked = {effect.id: effect for effect, _ in pairs}
+        aired = [(id_, told_in_air(at, effect, believed)) for id_, effect in asked.items()]
+        return [*out, *((id_, start) for id_, start in aired if start is not None)]
 
     def _sieved(
         self, fit: Fit, found: list[Start], signatures: Signatures, believed: tuple[Array, Array]
@@ -304,11 +309,13 @@ class Sieve:
         return kept or trials
 
     def _plainest(self, trials: list[Trial]) -> Trial:
-        """The best; or a form of fewer numbers that is as good for what there is to explain."""
+        """The best; or a form of fewer numbers that is as good for what there is to explain, or leaves less than noise
+        would."""
         best = trials[0]
         for t in trials[1:]:
             fewer = t.fit.free < best.fit.free
-            if fewer and t.fit.chi2 - best.fit.chi2 < PLAIN * self.prepared.memory:
+            as_good = t.fit.chi2 - best.fit.chi2 < PLAIN * self.prepared.memory
+            if fewer and (as_good or t.fit.chi2 < LESS * self.expected):
                 best = t
         return best
 

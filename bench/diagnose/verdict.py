@@ -67,7 +67,8 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
     a later fit takes it off: two fits share their noise, and their difference is far surer than the floor."""
     squares = [held_out_square(prepared, fit) for fit in fits]
     n, memory = float(prepared.full.weight.sum()), prepared.colour.memory
-    noise_std = max(prepared.floor_square_std, floor_N**2 * _square_std(prepared, fits[-1]))
+    # what is far off stands in few samples too: of those alone nothing is within chance
+    noise_std = max(prepared.floor_square_std, floor_N**2 * min(_square_std(prepared, fits[-1]), 0.5 * UNSEEN))
     out = []
     for number, (square, fit) in enumerate(zip(squares, fits, strict=True)):
         doubt = 2.0 * noise_std + floor_N**2 * 2.0 * fit.free * memory / n
@@ -87,6 +88,14 @@ def seen(excess: Sequence[float], floor_N: float) -> list[float]:
     too, of which the holds have told too little."""
     left = excess[-1] if excess[-1] < UNSEEN * floor_N**2 else 0.0
     return [max(e - left, 0.0) for e in excess]
+
+
+def floor_told(before_N: float, after_N: float, left: float, floor_N: float) -> float:
+    """The noise floor, N, for which `left` is what the errors on held-out data, before and after, leave beyond it. What
+    was taken for noise counts as noise; where that is not near the floor known, this one stands."""
+    square = (after_N**2 - left * before_N**2) / (1.0 - left) if left < 1.0 else 0.0
+    told = float(np.sqrt(max(square, 0.0)))
+    return told if abs(told**2 / floor_N**2 - 1.0) < UNSEEN else floor_N
 
 
 def _square_std(prepared: Prepared, fit: Fit) -> float:

@@ -13,6 +13,8 @@ From a tare while something touched, a cable that pulls, a probe changed after t
 - `in_motion`: bias · (1 + share m), m = 1 while the probe moves and 0 while it rests: a drive's carrier that an
   amplifier rectifies (IEC 61326-2-3, Electromagnetic compatibility of transducers).
 
+- `swinging`: bias · (1 + share sin(2πt/period + angle)), as where a heater, a draught or a compressor comes and goes.
+
 The share is small: a zero that moves by more of itself than that drifts. A drift begins at zero; a bias is there from
 the first sample on.
 
@@ -29,6 +31,7 @@ from sim.effects.linear import first_order
 from sim.jit import State, block
 
 _MOST = 0.3  # of the bias, by which it may change
+_PERIODS_S, _ANGLES = (4.0, 8.0, 14.0, 30.0), (-1.6, 0.0, 1.6, 3.1)
 _SLOW_MM_S = 0.02  # at which a motion counts half
 
 
@@ -50,6 +53,13 @@ def slipping(dt: float, force: float, state: State, p: State) -> float:
     """State: time since the first sample; p = (bias, share, moved_at, within)."""
     state[0] += dt
     return force + p[0] * (1.0 + 0.5 * p[1] * math.tanh((state[0] - p[2]) / p[3]))
+
+
+@block
+def swinging(dt: float, force: float, state: State, p: State) -> float:
+    """State: time since the first sample; p = (bias, share, period, angle)."""
+    state[0] += dt
+    return force + p[0] * (1.0 + p[1] * math.sin(2.0 * math.pi * state[0] / p[2] + p[3]))
 
 
 @block
@@ -128,6 +138,19 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"sensor": slipping},
+            state=(0.0,),
+        ),
+        Form(
+            name="swinging",
+            what="a little more and less in turn, as time goes",
+            parameters=(
+                _BIAS,
+                _share("how much more of it there is at the most"),
+                Parameter("period", "s", 1.0, 1e4, 15.0, "time after which it is the same again", starts=_PERIODS_S),
+                Parameter("angle", "rad", -math.pi, math.pi, 0.5, "of its turn at the first sample", starts=_ANGLES),
+            ),
+            sought=False,
+            blocks={"sensor": swinging},
             state=(0.0,),
         ),
         Form(

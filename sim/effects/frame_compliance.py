@@ -14,6 +14,9 @@ of K. The force used is the one at the cell, solved within the step (sim/kernel.
   P, rounded over r P since faces part bit by bit: m(F) = (F + √(P² + (r P)²) − √((F − P)² + (r P)²))/2 (J. H. Bickford,
   Introduction to the Design and Behavior of Bolted Joints, 4th ed., CRC, 2008).
 - `closing`: the same with k > 1: faces that are not yet home are soft until P has closed the joint.
+- `graded`: C F_0 U(|F|/F_0)/U(1) sgn F, where U' is 1 at no force, and `third`, `two_thirds` and `whole` at those parts
+  of F_0, in straight lines between: a compliance that is measured over the force, as instrumented indentation asks
+  (ISO 14577-2, Metallic materials, instrumented indentation, verification and calibration of testing machines).
 - `slipping`: C ((1 − s) F + s G), where G is the middle of a play of the full width 2 `slip_force` that F drags along.
   A share s sits in joints whose edges stick until the force has changed by that width, and slip then. The curve is a
   loop; C is the mean of its two ways (W. D. Iwan, J. Appl. Mech. 33, 1966, 893–900; L. Gaul, R. Nitsche, The role of
@@ -75,6 +78,21 @@ def joint(dt: float, force: float, state: State, p: State) -> float:
 
 
 @block
+def graded(dt: float, force: float, state: State, p: State) -> float:
+    """Deflection in mm; p = (compliance, third, two_thirds, whole, at_force)."""
+    size = abs(force) / p[4]
+    way, before, begin = 0.0, 1.0, 0.0
+    for k in range(1, 4):
+        part = min(max(size - begin, 0.0), 1.0 / 3.0)
+        way += part * (before + 1.5 * part * (p[k] - before))
+        before = p[k]
+        begin += 1.0 / 3.0
+    way += max(size - 1.0, 0.0) * p[3]
+    whole = (0.5 + p[1] + p[2] + 0.5 * p[3]) / 3.0
+    return float(p[0] * p[4] * math.copysign(way, force) / whole)
+
+
+@block
 def slipping(dt: float, force: float, state: State, p: State) -> float:
     """Deflection in mm; p = (compliance, share, slip_force); state: the force that the joints have followed."""
     state[0] = min(max(state[0], force - p[2]), force + p[2])
@@ -121,6 +139,12 @@ def _compliance(what: str) -> Parameter:
 
 def _preload(what: str) -> Parameter:
     return Parameter("preload", "N", 1e-2, 1e4, 2.0, what, starts=(2.0,))
+
+
+def _relative(name: str, where: str) -> Parameter:
+    return Parameter(
+        name, "1", 0.01, 20.0, 0.8, f"what a further newton adds at {where}, over that at none", starts=(0.5, 1.3)
+    )
 
 
 _ROUNDING = Parameter("rounding", "1", 0.01, 2.0, 0.1, "width of the bend over the preload", fixed=True)
@@ -184,6 +208,19 @@ EFFECT = Effect(
                 _AT_FORCE,
             ),
             blocks={"frame": joint},
+        ),
+        Form(
+            name="graded",
+            what="another compliance at each force",
+            parameters=(
+                _compliance("deflection per newton at `at_force`"),
+                _relative("third", "a third of `at_force`"),
+                _relative("two_thirds", "two thirds of it"),
+                _relative("whole", "`at_force` and beyond"),
+                _AT_FORCE,
+            ),
+            sought=False,
+            blocks={"frame": graded},
         ),
         Form(
             name="slipping",
