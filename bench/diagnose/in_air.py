@@ -1,14 +1,17 @@
-"""What the zero does is seen in air, whatever has become of the pad: beside a drift that it does not know, a refit makes
-one of the pad's modes slow and large, and from there no search finds back."""
+"""What the zero does is seen in air, whatever has become of the pad: beside a drift that it does not know, a refit
+makes one of the pad's modes slow and large, and from there no search finds back."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.effects import Effect
 
 from .candidates import Signatures, Start
 from .numbers import cause_of
+
+Array = NDArray[np.float64]
 
 NAMED = "force_drift"
 ABOVE = 0.02  # of the depth, above the surface: surely in air
@@ -18,7 +21,7 @@ TAKES = 0.5  # of that: so much a shape must take
 TIMES = np.geomspace(0.05, 3.0, 12)  # of the time from the first sample to the last
 
 
-def told_in_air(at: Signatures, effect: Effect, believed: np.ndarray) -> Start | None:
+def told_in_air(at: Signatures, effect: Effect, believed: Array) -> Start | None:
     """The drift that forces in air tell of, to start from with the pad as it was believed (P,); None where they tell of
     none, or the pad may pull there."""
     data, structure = at.data, at.fit.structure
@@ -29,8 +32,8 @@ def told_in_air(at: Signatures, effect: Effect, believed: np.ndarray) -> Start |
     if float(np.sum(data.weight[air])) < FEWEST:
         return None
 
-    def clear(values: np.ndarray) -> np.ndarray:
-        return values - np.sum(weight * values) / np.sum(weight)
+    def clear(values: Array) -> Array:
+        return values - float(np.sum(weight * values) / np.sum(weight))
 
     left = clear(data.force_N - at.force)
     moves = float(np.sum(weight * left**2))

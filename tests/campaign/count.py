@@ -8,15 +8,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from .family import HELD_OUT
 from .judge import listed, named
 
 Line = dict[str, Any]
 
 NEAR = 0.10
 """Of a parameter's value, or of the noise floor."""
-
-HELD_OUT = 1.15
-"""Times the noise floor."""
 
 TOLD = 0.002
 """Of the noise power: what is smaller may be called consistent (docs/formats.md)."""
@@ -180,6 +178,13 @@ def held_out_near(line: Line) -> bool:
     """Error on data held out, after, within 1.15 of the noise floor stated."""
     after, floor = line["said"]["held_out_after"], line["said"]["noise_floor"]
     return after is not None and after <= HELD_OUT * floor
+
+
+def out_of_family(line: Line) -> bool:
+    """Whether the best of the cause's shapes, fitted without noise, leaves more than the error on data held out allows
+    beyond the noise: then no fit can reach that."""
+    left_N = line.get("family_rmse_N")  # older lines have none, nor those in which the error is within
+    return left_N is not None and bool(left_N**2 > (HELD_OUT**2 - 1.0) * line["truth"]["floor_N"] ** 2)
 
 
 def flags_pair(counts: Sequence[int]) -> tuple[float, float]:

@@ -25,6 +25,7 @@ from tests.truth.detect import Lab, _sigma, _whitened, freed, misfit, of_the_pad
 from tests.truth.noise import Coloured, Quantised, StudentT, White
 from tests.truth.rivals import as_good, as_good_in_place
 
+from .family import HELD_OUT, family_rmse_N
 from .plan import CATALOGUE, Item
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -122,15 +123,21 @@ def diagnosed(case: Case, folder: Path) -> dict[str, Any]:
     line = {"said": said, "ranking": ranking, "flags": flagged, "seconds": wall, "cpu_seconds": cpu}
     if case.truth.ids and not set(case.truth.ids) & set(CATALOGUE):
         line["clean_rmse_N"] = clean_rmse_N(case, measurement, Model.from_dict(result.model_dict))
+    if len(case.truth.ids) == 1 and result.held_out_after > HELD_OUT * result.noise_floor:
+        model, id = Model.from_dict(result.model_dict), case.truth.ids[0]
+        line["family_rmse_N"] = family_rmse_N(measurement, _clean_N(case, measurement), model, id)
     return line
+
+
+def _clean_N(case: Case, measurement: Measurement) -> np.ndarray:
+    return case.truth.clean_N[_rows(case, measurement.force_time_s)]
 
 
 def clean_rmse_N(case: Case, measurement: Measurement, model: Model) -> float:
     """RMS of what a model is off by from the force without noise, along the motion as it was measured."""
     from bench.like import likeness
 
-    clean_N = case.truth.clean_N[_rows(case, measurement.force_time_s)]
-    return likeness(model, replace(measurement, force_N=clean_N)).rmse_N
+    return likeness(model, replace(measurement, force_N=_clean_N(case, measurement))).rmse_N
 
 
 def _rows(case: Case, force_time_s: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bench.recording import read_recording
+from bench.recording.types import Measurement
 from sim.model import Model
 from tests.truth.cases import draw_case
 from tests.truth.effects import EFFECTS
@@ -18,12 +19,14 @@ from .count import (
     found_or_alike,
     imitated,
     least_beside,
+    out_of_family,
     right_listed,
     right_or_alike,
     spurious,
     stated,
     wrongs,
 )
+from .family import family_rmse_N
 from .halves import half as half_of
 from .judge import bounds, clean_rmse_N, score_flags, truth_of
 from .plan import CATALOGUE, Item, plan
@@ -113,6 +116,25 @@ def test_a_model_is_held_against_the_force_without_noise(tmp_path):
     model = Model.from_dict(case.truth.structure.model())
     bias_N = case.truth.parameters["force_bias"]["bias"]
     assert clean_rmse_N(case, measurement, model) == pytest.approx(abs(bias_N), rel=0.03)
+
+
+def test_what_no_shape_of_a_family_makes_is_left():
+    # A bias, as the family has it; and on it a sawtooth of the time that no bias has: half of its amplitude over √3.
+    how = {"protocol": "rich", "noise_kind": "white", "noise_N": 0.02, "position_noise_mm": 0.0, "jitter": "none"}
+    case = draw_case(2, ("force_bias",), 1.0, "constant", **how)
+    stamps = case.time_s if case.force_time_s is None else case.force_time_s
+    measurement = Measurement("case", case.time_s, case.position_mm, stamps, case.force_N)
+    model = Model.from_dict(case.believed | {"effects": [{"id": "force_bias", "form": "constant", "bias": 0.01}]})
+    saw_N = 0.1 * (stamps / 0.7 % 1.0)
+    left = [family_rmse_N(measurement, case.truth.clean_N + more, model, "force_bias") for more in (0.0, saw_N)]
+    assert left[0] < 0.002 and left[1] == pytest.approx(0.1 / np.sqrt(12.0), rel=0.1)
+    assert family_rmse_N(measurement, case.truth.clean_N, model, "outliers") is None
+
+
+def test_an_error_on_data_held_out_is_one_of_the_family_or_not():
+    # Of a floor of 12 mN 1.15 times is 13.8 mN, and √(13.8² − 12²) = 6.81.
+    left = [line([GOOD], family_rmse_N=left_N) for left_N in (0.0068, 0.0069)]
+    assert [out_of_family(own) for own in left] == [False, True] and not out_of_family(line([GOOD]))
 
 
 def test_bound_of_a_bias_by_hand():

@@ -111,3 +111,15 @@ def test_a_force_that_goes_slower_than_the_model_says_is_not_stuck():
         read = 0.05 * np.round((force + 0.005 * rng.standard_normal(5000)) / 0.05)
         far_off = 1.0 + 10.0 * (force - 1.0)
         assert not halted(read, far_off, np.zeros(5000, dtype=bool), 0.005).any()
+
+
+def test_a_force_that_goes_on_a_sample_late_has_not_halted():
+    # At rest, and on its way from the sample 50 on; the model has it there one sample too soon.
+    read = np.concatenate([np.zeros(50), 0.1 * np.arange(1.0, 51.0)])
+    soon = np.append(read[1:], 5.1)
+    none = np.zeros(100, dtype=bool)
+    assert not halted(read, soon, none, 0.005).any()
+    stays = read.copy()
+    stays[60:65] = stays[59]
+    found = np.flatnonzero(halted(stays, soon, none, 0.005))
+    assert found.size and set(found) <= set(range(60, 65))
