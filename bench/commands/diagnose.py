@@ -67,7 +67,7 @@ def main(args: argparse.Namespace) -> int:
     if args.report:
         from bench.report.diagnosis import write_diagnosis
 
-        write_diagnosis(args.report, result)
+        write_diagnosis(args.report, result, f"Diagnosis · {args.data.name} and {Path(args.model).name}")
     return EXIT_DONE
 
 
@@ -88,4 +88,8 @@ def _write_next(path: Path, result: Diagnosis, *, quiet: bool) -> None:
 
         write_protocol(path, result.next_protocol)
     elif not quiet:
-        print(f"no next test is needed, and {path} was not written: no two causes remain that a test could tell apart")
+        from bench.diagnose.words import doubtful
+
+        remain = any(doubtful(cause) for cause in result.causes)
+        why = "no test within these limits tells those that remain apart" if remain else "no two causes remain in doubt"
+        print(f"no next test: {why}; {path} was not written")

@@ -43,8 +43,11 @@ SHOWN = 6
 """Numbers of one cause that a terminal shows."""
 NEAR = 0.5
 """Share of the gain from which an excluded rival is worth a word."""
+UNTOLD = 0.7
+"""Of a number, that its standard deviation may be for it to be told."""
 LEAST = 0.01
 """Share of the gain below which its size says no more."""
+NOT_KNOWN = "no cause that is known here was found to do all of this: look at what remains before trusting the model"
 REMAINS = 3
 """Sentences on what is left."""
 
@@ -83,13 +86,17 @@ def verdict(d: Diagnosis) -> str:
             f"{what} explains these data down to their noise" if not in_air(d) else f"{what} adds nothing to the noise"
         )
     if d.verdict == "explained":
-        doubted = any(max(c.confidence, c.of_its_kind) <= TOLD_ONCE for c in d.causes)
-        told = "can be explained by" if doubted else "is explained by"
+        told = "can be explained by" if unsure(d) else "is explained by"
         return f"What {'the bench adds' if in_air(d) else 'the model gets wrong'} {told} {named(d)}"
     if d.causes:
         verb = "takes" if len(d.causes) == 1 else "take"
         return f"Unexplained: {named(d)} {verb} {percent(1 - d.left)} of the error, no known cause the rest"
     return "Unexplained: no known cause takes what is left"
+
+
+def unsure(d: Diagnosis) -> bool:
+    """Whether a name is as likely another."""
+    return any(max(c.confidence, c.of_its_kind) <= TOLD_ONCE for c in d.causes)
 
 
 def errors(d: Diagnosis) -> str:
@@ -104,7 +111,7 @@ def errors(d: Diagnosis) -> str:
 def headline(d: Diagnosis) -> str:
     """The verdict in one line, its word first."""
     if d.verdict == "explained":
-        return f"explained by {named(d)}: {errors(d)}"
+        return f"explained{', perhaps' if unsure(d) else ''} by {named(d)}: {errors(d)}"
     return f"{d.verdict}: {lowered(verdict(d).removeprefix('Unexplained: '))}; {errors(d)}"
 
 
@@ -124,9 +131,7 @@ def lines(d: Diagnosis) -> list[str]:
         out += [f"  {sentence}" for sentence in remains(d)]
     out += [f"  {sentence}" for sentence in warnings(d)]
     if d.verdict == "unexplained":
-        out.append(
-            "  no cause of the catalogue (docs/effects.md) does this: look at what remains before trusting the model"
-        )
+        out.append(f"  {NOT_KNOWN}")
     if d.next_protocol is not None:
         out.append(f"  next test: {d.next_protocol['description']} (`--next FILE` writes the protocol)")
     return out
@@ -144,9 +149,8 @@ def warnings(d: Diagnosis) -> list[str]:
         return d.doubts
     return [
         *d.doubts,
-        f"the run never comes back, or goes to and fro less than twice and holds at fewer than {LEVELS} depths: what"
-        " acts with the motion cannot be told from a pad that is stranger than its law there, and no such name is more"
-        f" than {percent(TOLD_ONCE)} sure (press and return more often, or hold at more depths)",
+        f"too little comes twice in this run to tell what acts with the motion from an odd pad: no such name is more"
+        f" than {percent(TOLD_ONCE)} sure (press and return twice or more, or hold at {LEVELS} depths or more)",
     ]
 
 
@@ -193,10 +197,16 @@ def numbers(cause: CauseFound, most: int = SHOWN) -> str:
     return ", ".join(said)
 
 
+def untold(cause: CauseFound) -> str:
+    """Which of the numbers that the sentence on the cause, or its form, rests on these data hardly tell; empty: none."""
+    wide = [name for name, n in cause.parameters.items() if math.isfinite(n.std) and n.std > UNTOLD * abs(n.value) > 0]
+    return f"hardly told by these data: {', '.join(wide)}" if wide else ""
+
+
 def _cause(number: int, cause: CauseFound) -> list[str]:
     out = [f"  {number}. {name_of(cause.id)} ({cause.form}): {percent(cause.gain)} of the error, {sure(cause)}"]
     out.append(f"     {cause.explanation}")
-    for line in (numbers(cause), rivals(cause), f"check: {cause.check}" if cause.check else ""):
+    for line in (numbers(cause), untold(cause), rivals(cause), f"check: {cause.check}" if cause.check else ""):
         if line:
             out.append(f"     {line}")
     return out

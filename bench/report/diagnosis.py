@@ -62,7 +62,7 @@ def card(d: Diagnosis, heading: str = "", *, notes: bool = True, remark: str = "
     said.append(" ".join(_sentence(words_) for words_ in words.remains(d)) if d.verdict != "consistent" else "")
     said += [_sentence(sentence) for sentence in words.warnings(d)]
     if d.verdict == "unexplained":
-        said.append("No cause of the catalogue does this: look at what remains before trusting the model.")
+        said.append(_sentence(words.NOT_KNOWN))
     paragraphs = "".join(f"<p>{markup.text(sentence)}</p>" for sentence in said if sentence)
     before = "error on held-out data, before" if d.causes else "error on held-out data"
     tiles = [(before, force(d.held_out_before))]
@@ -128,6 +128,7 @@ def _numbers(cause: CauseFound) -> str:
         value, doubt = measured(n.value, n.std)
         unit = "" if n.unit in ("1", "") else f" {n.unit.replace('*', '·')}"
         lines.append(f"{name} = {value}{f' ± {doubt}' if math.isfinite(n.std) else ''}{unit}")
+    lines += [said] if (said := words.untold(cause)) else []
     return "\n".join(lines)
 
 

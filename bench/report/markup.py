@@ -97,7 +97,7 @@ def tiles(pairs: Iterable[tuple[str, str]]) -> str:
     """The few numbers to see first: (name, value)."""
     return (
         '<div class="tiles">'
-        + "".join(f'<div class="tile"><b>{text(value)}</b><span>{text(name)}</span></div>' for name, value in pairs)
+        + "".join(f'<div class="tile"><b>{text(value)}</b> <span>{text(name)}</span></div>' for name, value in pairs)
         + "</div>\n"
     )
 

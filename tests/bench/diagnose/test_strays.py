@@ -115,8 +115,8 @@ def test_a_force_that_goes_slower_than_the_model_says_is_not_stuck():
 
 def test_a_force_that_goes_on_a_sample_late_has_not_halted():
     # At rest, and on its way from the sample 50 on; the model has it there one sample too soon.
-    read = np.concatenate([np.zeros(50), 0.1 * np.arange(1.0, 51.0)])
-    soon = np.append(read[1:], 5.1)
+    read = np.concatenate([[-1.0], np.zeros(49), 0.1 * np.arange(1.0, 51.0)])
+    soon = np.concatenate([[-1.0], read[2:], [5.1]])
     none = np.zeros(100, dtype=bool)
     assert not halted(read, soon, none, 0.005).any()
     stays = read.copy()

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from bench.diagnose.result import Number
-from bench.diagnose.words import NAMES, headline, lines, name_of, percent, verdict
+from bench.diagnose.words import NAMES, headline, lines, name_of, percent, untold, verdict
 from sim.effects import all_effects
 from tests.bench.diagnose.small import PAD, made_up
 
@@ -37,14 +37,25 @@ def test_an_explanation_under_a_doubtful_name_is_one_that_can_be():
     assert verdict(d) == "What the model gets wrong is explained by friction"
     doubted = made_up(causes=[replace(d.causes[0], confidence=0.5)])
     assert verdict(doubted) == "What the model gets wrong can be explained by friction"
+    assert lines(doubted)[0].startswith("explained, perhaps by friction: ")
     late = made_up(causes=[replace(d.causes[0], confidence=0.4, of_its_kind=0.98)])
     assert verdict(late) == "What the model gets wrong is explained by friction"
 
 
 def test_where_depths_are_met_once_the_doubt_and_the_cure_are_told():
-    assert "comes back" not in "\n".join(lines(made_up()))
+    assert "comes twice" not in "\n".join(lines(made_up()))
     said = "\n".join(lines(made_up(seen_once=True)))
-    assert "no such name is more than 50 % sure" in said and "hold at more depths" in said
+    assert "no such name is more than 50 % sure" in said and "hold at 4 depths or more" in said
+
+
+def test_numbers_that_the_data_hardly_tell_are_said_to_be_such():
+    first = made_up().causes[0]
+    assert untold(first) == ""
+    wide = replace(
+        first, parameters={**first.parameters, "reach": Number(0.3, "mm", 14.0), "none": Number(0.0, "1", 1.0)}
+    )
+    assert untold(wide) == "hardly told by these data: reach"
+    assert untold(wide) in "\n".join(lines(made_up(causes=[wide])))
 
 
 def test_excluded_rivals_are_said_to_be_excluded_and_only_near_ones():
@@ -84,7 +95,8 @@ def test_verdicts(changes, pattern):
 
 
 def test_what_cannot_be_explained_is_not_left_at_that():
-    assert any("docs/effects.md" in line for line in lines(made_up(verdict="unexplained", causes=[], left=1.0)))
+    said = lines(made_up(verdict="unexplained", causes=[], left=1.0))
+    assert any("no cause that is known here" in line and "look at what remains" in line for line in said)
 
 
 def test_errors_that_hardly_differ_are_told_apart():
