@@ -198,7 +198,7 @@ def numbers(cause: CauseFound, most: int = SHOWN) -> str:
 
 
 def untold(cause: CauseFound) -> str:
-    """Which of the numbers that the sentence on the cause, or its form, rests on these data hardly tell; empty: none."""
+    """Which of a cause's numbers these data hardly tell; empty: none."""
     wide = [name for name, n in cause.parameters.items() if math.isfinite(n.std) and n.std > UNTOLD * abs(n.value) > 0]
     return f"hardly told by these data: {', '.join(wide)}" if wide else ""
 
