@@ -4,6 +4,8 @@
 - `upper`: at +limit alone.
 - `stop`: beyond +limit an overload stop bears beside the cell, which feels a share of what is more, as the stiffnesses
   of both have it.
+- `recovering`: at +limit for a time after the force has come back below it too: an amplifier that was driven into its
+  rail takes a while to leave it (its overload recovery time).
 - `soft`: a knee, u/(1 + |u/limit|^sharpness)^(1/sharpness): an amplifier near its rails.
 
 Reference: H. K. Khalil, Nonlinear Systems, 3rd ed., Prentice Hall, 2002, section 1.2 (common nonlinearities); E. O.
@@ -11,6 +13,8 @@ Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 199
 """
 
 from __future__ import annotations
+
+import math
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
@@ -32,6 +36,20 @@ def upper(dt: float, force: float, state: State, p: State) -> float:
 def stop(dt: float, force: float, state: State, p: State) -> float:
     """A share of what is beyond +limit; p = (limit, passes)."""
     return force if force <= p[0] else p[0] + p[1] * (force - p[0])
+
+
+@block
+def recovering(dt: float, force: float, state: State, p: State) -> float:
+    """At +limit for a time after each overload, which ends within tenths of it; p = (limit, recovery). State: whether
+    there was one, and the time since."""
+    if force >= p[0]:
+        state[0], state[1] = 1.0, 0.0
+        return p[0]
+    state[1] += dt
+    late = (state[1] / p[1] - 1.0) * 20.0
+    if state[0] == 0.0 or late > 40.0:
+        return force
+    return force + (p[0] - force) / (1.0 + math.exp(late))
 
 
 @block
@@ -67,6 +85,17 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"sampling": stop},
+        ),
+        Form(
+            name="recovering",
+            what="in compression, and for a while after",
+            parameters=(
+                _LIMIT,
+                Parameter("recovery", "s", 1e-3, 5.0, 0.03, "how long it stays there", starts=(0.005, 0.02, 0.08)),
+            ),
+            sought=False,
+            blocks={"sampling": recovering},
+            state=(0.0, 0.0),
         ),
         Form(
             name="soft",
