@@ -27,6 +27,7 @@ BEYOND = 3.0  # standard deviations of touch-off and tare, within which neither 
 MOST_LEFT, SPEAKS = 0.6, 0.01  # of what is left, and of the noise power: a cause beside a far larger one takes so much
 RIVAL = 25.0  # Δχ², rescaled by what is left: less excludes no rival
 FEWEST = 3  # samples at fault that are called a fault
+FURTHER = 50.0  # Δχ² that a further cause takes at the least: less is hardly to be seen beside the first
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 TRACE = 2e-4  # the same, of one that takes most of what a far larger one leaves: no shape is so exact
 
@@ -60,7 +61,11 @@ class Evidence:
         """Significant, and large enough to speak of."""
         if not self.significant or self.crumb < CRUMB:
             return False
-        if self.known == 0 or self.share >= SHARE:
+        if self.known == 0:
+            return True
+        if self.effective < FURTHER:  # no shape is exact, and a little of what one misses looks like something
+            return False
+        if self.share >= SHARE:
             return True
         # a small one beside a giant; but a third that is small has two inexact shapes to be the rest of
         return self.known == 1 and self.share >= TRACE and self.of_left >= MOST_LEFT and self.crumb >= SPEAKS
