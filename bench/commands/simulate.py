@@ -58,7 +58,7 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
     for problem in preflight.errors:
         print(f"note: on bench '{bench.name}' this would be refused: {problem}")
     _must_be_finite(args.model, preflight.prediction.force_N)
-    fine = predict(preflight.plan, model, FINER)
+    fine = predict(preflight.plan, model, min(FINER, max(MOST / preflight.prediction.time_s.size, 1.0)))
     duration_s = float(fine.time_s[-1])
     rate_Hz = min(motor_rate_Hz(bench, protocol.sampling.motor), MOST / duration_s)
     time_s = np.arange(int(duration_s * rate_Hz) + 1) / rate_Hz

@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 NEAR = 1.5  # times the noise, within which a model is right enough to judge single samples
 STRAYS = 0.25  # of the holds: so many samples that stand off beside others that do are no transients
 AGAIN = 3  # samples of one value that a force on its way does not have
-GONE = 2  # samples of them
+GONE = 2  # samples of them by which it has: one alone may be late
 JUMP = 0.5  # of the way a force has gone while its channel stayed
 LEAST = 20.0  # times the least noise, that a stray is off by where there is none: moments of contact stand off too
 STEPS, DEVIATIONS = 2.0, 8.0  # of the channel, and of its noise: so far a force has gone that shows none of it
@@ -58,7 +58,6 @@ def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask
         way_N = float(np.ptp(modelled_N[run]))
         left = np.abs(modelled_N[run] - modelled_N[begin]) > far
         jump_N = float(abs(force_N[min(begin + count, len(force_N) - 1)] - force_N[begin]))
-        # gone in the last of them alone, it may be late by a sample
         if left.sum() >= GONE and jump_N > JUMP * way_N and force_N[begin] not in ends and not but[run].any():
             # on its way a force is within a step for some samples before; half of them, on the average, are of this run
             passing = int(0.5 * count * step_N / way_N)

@@ -28,6 +28,7 @@ from .held_out import SEEN, held_out_square, later_square
 from .hum import Line
 from .hum import find as line_of
 from .modes import missing_told
+from .noise import HARDLY_ANY
 from .numbers import PadNumbers, Structure, cause_of, shapes_of
 from .path import Path
 from .refit import Fit, extended, force_at, mean_square, onto, placed, refit
@@ -60,7 +61,6 @@ NEARLY_ALL = 0.9  # of the error beyond the noise
 UNTOLD = 2.0  # times the square that the belief leaves: then its end cannot be foretold
 HARM = 1.2  # times the square of an error: a cause that makes more of it is none
 SAME_LINE = 0.01  # of its frequency
-QUIET = 0.5  # of the least noise that a load cell has
 FADED = 0.25  # of its size as found
 SETTLED_S = 0.15  # after a move
 RIVALS = 4  # models of the best single causes that are kept
@@ -405,8 +405,8 @@ def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:
     for s in holds(full.time_s, full.position_mm):
         still[s.start : s.stop] = full.time_s[s] > full.time_s[s.start] + SETTLED_S
     at = prepared.at[(full.weight[prepared.at] > 0) & still[prepared.at]]
-    if len(at) and np.std(residual_N[at]) < QUIET * prepared.noise.force_N:
-        return None  # of a simulation without noise
+    if len(at) and np.mean(residual_N[at] ** 2) < HARDLY_ANY * prepared.noise.force_N**2:
+        return None
     return swinging(full.time_s[at], residual_N[at], prepared.sample_s)
 
 

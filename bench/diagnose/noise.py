@@ -36,6 +36,7 @@ WINDOW_S, SHORTEST = 0.4, 24  # in which noise is compared with noise; samples
 CHANCE = 1e-3  # that a window of noise alone is left out
 TAILS = 1.5  # times more than Gaussian noise does a window of heavy-tailed noise vary
 STEADY = 0.02  # relative doubt of every level: no noise is exactly of this form
+HARDLY_ANY = 0.5  # of what noise leaves, in power: so little only a simulation without noise does
 FINEST, NEARLY_ALL = 2e-5, 0.99  # of the force that nearly all samples are below
 MISFIT = 2.0  # times better must colour make the fit of noise with structure beside it
 COLOURED, PAYS = 3.0, 20.0  # twice the log-likelihood by which colour, and structure beside the noise, must better it

@@ -15,6 +15,7 @@ from .candidates import CHANNEL, LONGEST_PERIOD, Reach, Signatures, combinations
 from .data import Data
 from .modes import NAMED as MISSING
 from .modes import as_believed, missing_told
+from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, force_at, reduced, refit
 from .ripple import ripples
@@ -27,7 +28,6 @@ FEW, TRIED = 3, 2  # steps of the best starts
 NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
 AS_GOOD = 4.0  # Δχ² by which one that is near to what was believed may be worse
-LESS = 0.5  # of what noise leaves: so little only a simulation without noise does, and no shape is told by it
 LEFT = 1.03  # times the noise power: what leaves more may have a period beyond those sought
 EDGE = 1e-6  # within which a coordinate is at its bound
 WORKERS = 2
@@ -92,8 +92,8 @@ def scores(short: Data, members: Sequence[Member]) -> Array:
 def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
     """The fit with each of its causes in the best of its shapes; `own`: causes at the begin that stay as they are."""
     lead, kept = stand_in(short, fit)
-    if len(kept) < len(fit.structure.causes) or lead.chi2 < LESS * np.count_nonzero(short.weight > 0):
-        return fit
+    if len(kept) < len(fit.structure.causes) or lead.chi2 < HARDLY_ANY * np.count_nonzero(short.weight > 0):
+        return fit  # or without noise, where the plainest shape stands as it was found
     lead = taken = replace(lead, x=missing_told(lead, lead.structure))
     for index in range(own, len(kept)):
         members = families(short, taken, [index])[0]

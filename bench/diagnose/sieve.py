@@ -18,6 +18,7 @@ from .data import Data, Prepared
 from .evidence import believable, penalty, unexplained
 from .in_air import told_in_air
 from .late import LATE, as_late, lateness_s
+from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
 from .path import Trial
 from .refit import Fit, extended, force_at, jacobian, refit
@@ -40,7 +41,6 @@ NEAR = 2.0  # times χ² before: another law that is no farther off after a few 
 KNEES = ("soft",)  # forms that say more than that the greatest forces are at a ceiling
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
 WORKERS = 2  # threads: the plant runs without Python's lock
-LESS = 0.5  # of what noise leaves: so little only a simulation without noise does
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 LIMIT = 24.0  # Δχ² by which one with a number at its bound must be better: it is another cause's limit
@@ -315,7 +315,7 @@ class Sieve:
         for t in trials[1:]:
             fewer = t.fit.free < best.fit.free
             as_good = t.fit.chi2 - best.fit.chi2 < PLAIN * self.prepared.memory
-            if fewer and (as_good or t.fit.chi2 < LESS * self.expected):
+            if fewer and (as_good or t.fit.chi2 < HARDLY_ANY * self.expected):
                 best = t
         return best
 
