@@ -24,6 +24,8 @@ UNSEEN = 0.2  # of the noise power: what no test of structure sees of what is le
 TOLD_SIZE = 0.25  # of a cause's size, that its standard deviation may be for a sure name
 NOTHING = 0.1  # of its standard deviation, that a size is
 HARDLY = 0.3  # sure of a name
+SLIGHT, SLIGHTLY = 0.02, 0.65  # of the error: how sure a cause that takes less beside another can be. In a campaign two
+# of three were right, and what the others took was missing from the first one's shape
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
 
@@ -110,9 +112,9 @@ def _square_std(prepared: Prepared, fit: Fit) -> float:
 
 
 def explains(left: float, causes: Sequence[CauseFound]) -> bool:
-    """Whether causes explain an error of which a share is left: they may leave less, the less sure they are; and many
-    of them, of which one is hardly sure, explain nothing."""
-    sure = min((max(c.confidence, c.of_its_kind) for c in causes), default=1.0)
+    """Whether causes explain an error of which a share is left: they may leave less, the less sure they are, but for
+    those that take next to nothing; and many of them, of which one is hardly sure, explain nothing."""
+    sure = min((max(c.confidence, c.of_its_kind) for c in causes if c.gain >= SLIGHT), default=1.0)
     if len(causes) >= MANY and sure < HARDLY:
         return False
     return left <= EXPLAINED * sure * (0.5 if len(causes) >= MANY else 1.0)
@@ -190,6 +192,7 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
         cause = final.structure.causes[own + k]
         values = {name: number.value for name, number in numbers.items()}
         most = min(_of_its_size(cause, numbers), most_sure(cause.effect, search.reach.rich))
+        most = min(most, SLIGHTLY) if len(gains) > 1 and gain < SLIGHT else most
         confidence, kind = min(confidence, most), min(kind, most)
         out.append(
             CauseFound(

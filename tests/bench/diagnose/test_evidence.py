@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from bench.diagnose.evidence import Evidence, threshold
+from bench.diagnose.verdict import explains
+from tests.bench.diagnose.small import made_up
 
 
 @pytest.mark.parametrize(
@@ -15,3 +19,9 @@ def test_a_further_cause_takes_more_than_a_first(effective: float, known: int, p
     assert threshold(1) == pytest.approx(15.9, abs=0.1)
     step = Evidence(effective, effective, 1, threshold(1), share=0.1, crumb=0.02, of_left=0.5, known=known)
     assert step.pays is pays
+
+
+def test_what_takes_next_to_nothing_leaves_the_rest_as_explained_as_it_is() -> None:
+    first = replace(made_up().causes[0], gain=0.8, confidence=0.99)
+    for gain, explained in ((0.01, True), (0.05, False)):  # a fifth is left, and of a quarter 65 % are 16 %
+        assert explains(0.19, [first, replace(first, gain=gain, confidence=0.65)]) is explained
