@@ -34,7 +34,7 @@ from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import departed, families
-from .sieve import ALL, BETTER, CLOSE, COMPARED, FEW, LATER, MORE, WORKERS, Sieve, drawn, repeating_first
+from .sieve import ALL, BETTER, CLOSE, COMPARED, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_first
 
 Array = NDArray[np.float64]
 
@@ -284,7 +284,7 @@ class Search(Sieve):
             return ranked
         with ThreadPoolExecutor(WORKERS) as pool:
             shaped = list(pool.map(self._shaped, [best, *near]))
-        lead = repeating_first(now, sorted(shaped, key=lambda t: t.score))[0]
+        lead = plainer_first(now, sorted(shaped, key=lambda t: t.score))[0]
         if lead.score > shaped[0].score - LATER * self.prepared.memory:
             lead = shaped[0]
         clean = lead.fit.chi2 - self.expected < CLEAN * max(now.chi2 - self.expected, 0.0)

@@ -45,6 +45,10 @@ PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 LIMIT = 24.0  # Δχ² by which one with a number at its bound must be better: it is another cause's limit
 AS_A_WAVE = 0.99  # of the gain of a law drawn through points: so much a wave takes that is what was drawn
+AS_A_NUMBER, FEWER = (
+    0.995,
+    0.5,
+)  # the same, of a law's gain, for a cause that has no more than this share of its numbers
 ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexplained: so little more is none
 
 
@@ -132,7 +136,7 @@ class Sieve:
         found_all += [sieved[i][0] for i in order[second:]]
         found_all.sort(key=lambda t: t.score)
         ranked = sorted(self._late_alike(fit, found_all, family), key=lambda t: t.score)
-        return repeating_first(fit, self._plainer(fit, ranked))
+        return plainer_first(fit, self._plainer(fit, ranked))
 
     def _plainer(self, fit: Fit, ranked: list[Trial]) -> list[Trial]:
         """First the one of fewest numbers, and of as many the first form of its family, where what it leaves more is
@@ -367,18 +371,26 @@ class Sieve:
         return self._trial(refit(self.short, trial.fit.structure, trial.fit.x, steps, 1e-8))
 
 
-def repeating_first(fit: Fit, ranked: list[Trial]) -> list[Trial]:
+def plainer_first(fit: Fit, ranked: list[Trial]) -> list[Trial]:
     """First an error of the position that repeats, where a law that is drawn through points stood in front of it and
-    takes hardly more of what `fit` leaves.
+    takes hardly more of what `fit` leaves; or a cause of few numbers, where a law of many did.
 
-    On a pad that stays put the two are the same function of the position, and a curve through points can be any; that
-    it comes out as a wave of more than one period tells of the encoder, and not of a pad.
+    On a pad that stays put a wave and a law are the same function of the position, and a curve through points can be
+    any; that it comes out as a wave of more than one period tells of the encoder, and not of a pad. So does a curve
+    that comes out as what a surface that lies elsewhere makes, but for a two-hundredth.
     """
-    if not ranked or not drawn(ranked[0]):
+    if not ranked or ranked[0].id != "elastic_law":
         return ranked
     gained = fit.chi2 - ranked[0].fit.chi2
-    wave = next((t for t in ranked[1:] if _repeats(t) and fit.chi2 - t.fit.chi2 > AS_A_WAVE * gained), None)
-    return ranked if wave is None else [wave, *(t for t in ranked if t is not wave)]
+    few = fit.free + FEWER * (ranked[0].fit.free - fit.free)
+
+    def is_all(t: Trial) -> bool:
+        plain = t.fit.free <= few and not ripples(t.cause.form)
+        share = AS_A_WAVE if _repeats(t) and drawn(ranked[0]) else AS_A_NUMBER if plain else np.inf
+        return fit.chi2 - t.fit.chi2 > share * gained
+
+    told = next((t for t in ranked[1:] if t.id != ranked[0].id and is_all(t)), None)
+    return ranked if told is None else [told, *(t for t in ranked if t is not told)]
 
 
 def drawn(trial: Trial) -> bool:
