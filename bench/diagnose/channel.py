@@ -17,7 +17,6 @@ from bench.identify.motion import holds
 from bench.recording.types import Measurement
 
 from .coarse import coarse_repeats, noise_steps
-from .noise import force_noise, least_N
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -58,7 +57,6 @@ AROUND_S = 0.02  # either side of a sample, where its speed and acceleration are
 TOGETHER, ONE_WAY = 0.5, 0.5  # of strays, that have another beside them, or go with the motion: fewer do
 BY_CHANCE = 2.5  # deviations of how often neighbours that stand off agree in sign, by chance
 MOSTLY = 0.5  # of the samples that stand off
-CRESTS, AT_A_CREST = 12, 4  # runs, and samples in one, that may be equal without noise as a force turns
 RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data
 
 
@@ -420,22 +418,6 @@ def not_of_the_motion(m: Measurement, found: Faults) -> Faults:
         kept = found.outlier & (still | _one_value(m.force_N, found.outlier))
         return replace(found, outlier=kept, unsure=found.outlier & ~kept)
     return found
-
-
-def without_noise(m: Measurement, found: Faults) -> Faults:
-    """Without the stuck samples at rest, in air, and with the values of the air, of a channel that has no noise, as a
-    simulation's: nothing moves its force there, and readings repeat."""
-    if not found.stuck.any() or max(force_noise(m, ~found.saturated).force_N, resolution(m.force_N)) >= least_N(m):
-        return found
-    depth_mm = m.position_at_forces_mm()
-    air = depth_mm < 0.0
-    natural = resting(m) | air | (np.diff(depth_mm, prepend=np.nan) == 0.0)
-    natural |= np.isin(m.force_N, np.unique(m.force_N[found.stuck & air]))
-    first, length = runs(m.force_N)
-    of_motion = (np.add.reduceat(natural.astype(int), first) == 0) & (length > 1)
-    if of_motion.sum() < CRESTS:
-        of_motion &= length > AT_A_CREST
-    return replace(found, stuck=found.stuck & np.repeat(of_motion, length))
 
 
 def resting(m: Measurement) -> Mask:

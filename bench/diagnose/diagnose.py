@@ -20,7 +20,7 @@ from sim.pad import Pad
 
 from .asked_again import asked_again, with_pulses
 from .candidates import CHANNEL
-from .channel import Faults, faults, not_of_the_motion, without_noise
+from .channel import Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
 from .data import Data, Prepared, prepare
 from .evidence import MOST_LEFT, SPEAKS, beyond_limit, of_slow_force, within_bounds
@@ -29,6 +29,7 @@ from .hum import Line
 from .hum import find as line_of
 from .modes import missing_told
 from .noise import HARDLY_ANY
+from .noiseless import without_noise
 from .numbers import PadNumbers, Structure, cause_of, shapes_of
 from .path import Path
 from .refit import Fit, extended, force_at, mean_square, onto, placed, refit

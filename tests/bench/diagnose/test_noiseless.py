@@ -10,8 +10,9 @@ import pytest
 import yaml
 
 from bench.diagnose import diagnose
-from bench.diagnose.channel import faults, without_noise
+from bench.diagnose.channel import faults
 from bench.diagnose.noise import force_noise, least_N
+from bench.diagnose.noiseless import without_noise
 from bench.recording.types import Measurement
 from sim.model import Model
 from tests.bench.diagnose.small import PAD, case, measurement
