@@ -45,10 +45,8 @@ PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 LIMIT = 24.0  # Δχ² by which one with a number at its bound must be better: it is another cause's limit
 AS_A_WAVE = 0.99  # of the gain of a law drawn through points: so much a wave takes that is what was drawn
-AS_A_NUMBER, FEWER = (
-    0.995,
-    0.5,
-)  # the same, of a law's gain, for a cause that has no more than this share of its numbers
+AS_A_NUMBER = 0.995  # the same, of a law's gain, for a cause of few numbers …
+FEWER = 0.5  # … which has no more than this share of the law's
 ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexplained: so little more is none
 
 

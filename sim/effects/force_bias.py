@@ -12,7 +12,6 @@ From a tare while something touched, a cable that pulls, a probe changed after t
   come back to zero after a load, and come back the later, the longer it lasted.
 - `in_motion`: bias · (1 + share m), m = 1 while the probe moves and 0 while it rests: a drive's carrier that an
   amplifier rectifies (IEC 61326-2-3, Electromagnetic compatibility of transducers).
-
 - `swinging`: bias · (1 + share sin(2πt/period + angle)), as where a heater, a draught or a compressor comes and goes.
 
 The share is small: a zero that moves by more of itself than that drifts. A drift begins at zero; a bias is there from
