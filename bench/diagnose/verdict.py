@@ -13,7 +13,7 @@ from .held_out import held_out_square
 from .late import LATE
 from .numbers import Cause, shapes_of
 from .path import Measure, Path, Trial
-from .refit import Fit, force_at, mean_square, reduced, refit
+from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
 from .search import Search
 from .way import most_sure
@@ -30,16 +30,15 @@ MANY = 3  # causes, as many as a search finds: so many together imitate what non
 
 
 def ordered(prepared: Prepared, fit: Fit, base: Fit, known: Sequence[Fit] = ()) -> Fit:
-    """The causes in the order of what leaving each one out would cost, in the squares that gains are told in. `known`:
-    as in `without`."""
+    """The causes in the order of what leaving each one out would cost, in χ²: what a mass feels of the encoder's noise
+    counts little. `known`: as in `without`."""
     own = len(base.structure.causes)
     number = len(fit.structure.causes)
     if number - own < 2:
         return fit
     costs = []
     for index in range(own, number):
-        rest = without(prepared, fit, index, known, 15)
-        costs.append(mean_square(prepared.full, rest.structure, rest.x))
+        costs.append(without(prepared, fit, index, known, 15).chi2)
     order = list(range(own)) + [own + int(k) for k in np.argsort(-np.array(costs), kind="stable")]
     structure = replace(fit.structure, causes=tuple(fit.structure.causes[i] for i in order))
     values = fit.structure.values(fit.x)
