@@ -66,16 +66,26 @@ class TooLong(Exception):
         self.index, self.total_s = index, total_s
 
 
-def predict(plan: Plan, believed: Model | None, finer: float = 1.0) -> Prediction:
+def predict(plan: Plan, believed: Model | None) -> Prediction:
     """Run the plan on the believed pad; without one, force targets go as deep as the limits allow.
 
-    `finer`: times as fine a grid as is drawn. Raises `TooLong`.
+    Raises `TooLong`.
     """
-    return _Timeline(plan, believed, finer).run()
+    return _Timeline(plan, believed).run()
+
+
+def planned_motion(plan: Plan, believed: Model, finer: float) -> tuple[Array, Array]:
+    """Times, s, and positions, mm (n,), of a plan on the believed pad, on a grid so many times as fine as is drawn.
+
+    Raises `TooLong`.
+    """
+    timeline = _Timeline(plan, believed, finer)
+    timeline.go()
+    return timeline.motion
 
 
 class _Timeline:
-    def __init__(self, plan: Plan, believed: Model | None, finer: float) -> None:
+    def __init__(self, plan: Plan, believed: Model | None, finer: float = 1.0) -> None:
         self.plan, self.believed, self.finer = plan, believed, finer
         by_force = any(s.kind in ("force_ramp", "force_hold") for s in plan.segments)
         self.plant: Plant | None = believed.plant() if believed is not None and by_force else None
@@ -88,7 +98,8 @@ class _Timeline:
         if self.plant is not None:
             self.force_N = self.plant.step(0.0, plan.start_mm)
 
-    def run(self) -> Prediction:
+    def go(self) -> tuple[list[float], list[Segment]]:
+        """When each segment begins, and the segments with their starts filled in; times and positions with them."""
         starts, segments = [], []
         for index, segment in enumerate(self.plan.segments):
             starts.append(self.now_s)
@@ -96,7 +107,16 @@ class _Timeline:
             before = len(self.times)
             self._add(index, segment)
             self.counts.append(sum(len(block) for block in self.times[before:]))
-        time, position = np.concatenate(self.times), np.concatenate(self.positions)
+        return starts, segments
+
+    @property
+    def motion(self) -> tuple[Array, Array]:
+        """Times and positions so far."""
+        return np.concatenate(self.times), np.concatenate(self.positions)
+
+    def run(self) -> Prediction:
+        starts, segments = self.go()
+        time, position = self.motion
         force = np.full(time.size, np.nan) if self.believed is None else self.believed.simulate(time, position)
         return Prediction(
             time_s=time,

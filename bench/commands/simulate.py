@@ -44,7 +44,7 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
     import numpy as np
 
     from bench.config import load_bench
-    from bench.predict import predict
+    from bench.predict import planned_motion
     from bench.preflight import check
     from bench.protocol import load_protocol
     from bench.rates import motor_rate_Hz
@@ -57,13 +57,13 @@ def _over_protocol(args: argparse.Namespace, model: Model) -> int:
     preflight = check(protocol, bench, model)
     for problem in preflight.errors:
         print(f"note: on bench '{bench.name}' this would be refused: {problem}")
-    _must_be_finite(args.model, preflight.prediction.force_N)
-    fine = predict(preflight.plan, model, min(FINER, max(MOST / preflight.prediction.time_s.size, 1.0)))
-    duration_s = float(fine.time_s[-1])
+    finer = min(FINER, max(MOST / preflight.prediction.time_s.size, 1.0))
+    fine_s, fine_mm = planned_motion(preflight.plan, model, finer)
+    duration_s = float(fine_s[-1])
     rate_Hz = min(motor_rate_Hz(bench, protocol.sampling.motor), MOST / duration_s)
     time_s = np.arange(int(duration_s * rate_Hz) + 1) / rate_Hz
-    position = np.interp(time_s, fine.time_s, fine.position_mm)
-    force = model.simulate_at(fine.time_s, fine.position_mm, time_s)
+    position, force = np.interp(time_s, fine_s, fine_mm), model.simulate_at(fine_s, fine_mm, time_s)
+    _must_be_finite(args.model, force)
     write_csv(args.out, time_s, position, time_s, force)
     print(f"wrote {args.out}: {time_s.size} samples over {duration_s:.1f} s, without noise")
     return EXIT_DONE

@@ -15,8 +15,8 @@ from sim.effects import Effect, Form
 from .candidates import Reach, Signatures, Start, forms, starts
 from .dashpot import instead_of_a_mode
 from .data import Data, Prepared
+from .drift_in_air import told_in_air
 from .evidence import believable, penalty, unexplained
-from .in_air import told_in_air
 from .late import LATE, as_late, lateness_s
 from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
@@ -45,9 +45,8 @@ PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 LIMIT = 24.0  # Δχ² by which one with a number at its bound must be better: it is another cause's limit
 AS_A_WAVE = 0.99  # of the gain of a law drawn through points: so much a wave takes that is what was drawn
-AS_A_NUMBER = 0.995  # the same, of a law's gain, for a cause of few numbers …
-FEWER = 0.5  # … which has no more than this share of the law's
 ALIKE, ALIKE_LEFT = 0.005, 0.3  # of the gain, and of what the best leaves unexplained: so little more is none
+FEWER = 0.5  # of a law's numbers: to a cause with no more of them ALIKE is enough
 
 
 class Sieve:
@@ -384,7 +383,7 @@ def plainer_first(fit: Fit, ranked: list[Trial]) -> list[Trial]:
 
     def is_all(t: Trial) -> bool:
         plain = t.fit.free <= few and not ripples(t.cause.form)
-        share = AS_A_WAVE if _repeats(t) and drawn(ranked[0]) else AS_A_NUMBER if plain else np.inf
+        share = AS_A_WAVE if _repeats(t) and drawn(ranked[0]) else 1.0 - ALIKE if plain else np.inf
         return fit.chi2 - t.fit.chi2 > share * gained
 
     told = next((t for t in ranked[1:] if t.id != ranked[0].id and is_all(t)), None)

@@ -21,7 +21,7 @@ OFF = 1.08  # what the pad believed is stiffer by
 
 
 def said_of(padbench, effects: list[dict]) -> dict:
-    """The diagnosis of a simulation of some effects over the shipped staircase, with a pad believed that has none."""
+    """The diagnosis of some effects simulated over the protocol `quick`, with a pad believed that has none."""
     Path("true.yaml").write_text(yaml.safe_dump({"pad": PAD, "effects": effects}))
     elastic = {**PAD["elastic"], "m": OFF * PAD["elastic"]["m"]}
     Path("believed.yaml").write_text(yaml.safe_dump({"pad": {**PAD, "elastic": elastic}}))

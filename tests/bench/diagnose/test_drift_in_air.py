@@ -12,7 +12,7 @@ from bench.diagnose.candidates import Signatures
 from bench.diagnose.channel import faults
 from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import believed_structure
-from bench.diagnose.in_air import told_in_air
+from bench.diagnose.drift_in_air import told_in_air
 from bench.diagnose.refit import refit
 from bench.recording.types import Measurement
 from sim import effects
