@@ -33,7 +33,7 @@ from .numbers import Cause, cause_of, shapes_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
-from .shapes import departed, families
+from .shapes import begun_anew, departed, families
 from .sieve import ALL, BETTER, CLOSE, COMPARED, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_first
 
 Array = NDArray[np.float64]
@@ -410,7 +410,8 @@ class Search(Sieve):
             for effect, form in forms(structure, structure.in_air, self.reach, also_unsought=True):
                 if effect.id != cause.id or form.name == cause.form.name:
                     continue
-                begun.append((here, alike(now, index, cause_of(effect, form))))
+                like = alike(now, index, cause_of(effect, form))
+                begun += [(here, c) for c in (like, *begun_anew(self.short, now, index, like))]
                 begun += [(without, s.cause) for s in starts(signatures, effect, form, near=numbers)]
         with ThreadPoolExecutor(WORKERS) as pool:
             first = [

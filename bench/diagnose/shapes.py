@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -167,23 +167,39 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     cause, end = structure.causes[index], len(structure.pad.coordinates)
     shape = narrowed(form, Reach.of(short, structure, short.sample_s))
     told = {p.name: values[index][p.name] for p in shape.parameters if p.name in values[index]}
-    fresh = replace(shape, parameters=tuple(p for p in shape.parameters if p.name not in told))
-    others = [*_thinned(list(combinations(fresh))), *_thinned(list(combinations(shape)))]
-    begun: list[tuple[float, Structure, Array]] = []
-    for started in [{}, *others]:
-        joined, x = _in_place(lead, index, cause_of(cause.effect, shape, told | started), lead.x[:end])
-        force = force_at(short, joined, x)
-        if not np.isfinite(force).all():
-            continue
-        e = short.whitened(short.force_N - force)
-        begun.append((float(np.sum(e * e)), joined, x))
-    begun.sort(key=lambda start: start[0])
-    tried = [refit(short, joined, x, FEW, NEARLY) for _, joined, x in begun[:TRIED]]
+    begun = [told | own for own in [{}, *_own(shape, told), *_thinned(list(combinations(shape)))]]
+    placed = [_in_place(lead, index, cause_of(cause.effect, shape, start), lead.x[:end]) for start in begun]
+    chi2 = _chi2(short, placed)
+    best_first = [placed[k] for k in np.argsort(chi2, kind="stable") if np.isfinite(chi2[k])]
+    tried = [refit(short, joined, x, FEW, NEARLY) for joined, x in best_first[:TRIED]]
     if not tried:
         return None
     best = min(tried, key=lambda fit: fit.chi2)
     member = Member(refit(short, best.structure, best.x, STEPS, NEARLY), index)
     return None if departed(member.fit, index) else member
+
+
+def begun_anew(short: Data, lead: Fit, index: int, like: Cause) -> list[Cause]:
+    """Another shape of a cause of a fit, `like` that one in the numbers that they share, with its own begun elsewhere:
+    where it fits best so."""
+    told = set(lead.structure.causes[index].start)
+    causes = [like.with_start(**own) for own in _own(like.form, told)]
+    placed = [_in_place(lead, index, cause, lead.x[: len(lead.structure.pad.coordinates)]) for cause in causes]
+    chi2 = _chi2(short, placed)
+    return [causes[k] for k in np.argsort(chi2, kind="stable")[:TRIED] if np.isfinite(chi2[k])]
+
+
+def _own(form: Form, told: Collection[str]) -> list[dict[str, float]]:
+    """Values to start from of what is not told; none where all is."""
+    fresh = replace(form, parameters=tuple(p for p in form.parameters if p.name not in told))
+    return _thinned([values for values in combinations(fresh) if values])
+
+
+def _chi2(short: Data, placed: Sequence[tuple[Structure, Array]]) -> Array:
+    """χ² of each structure as it stands; infinite where it makes no plant."""
+    forces = [force_at(short, structure, x) for structure, x in placed]
+    left = [short.whitened(short.force_N - f) if np.isfinite(f).all() else np.array([np.inf]) for f in forces]
+    return np.array([float(np.sum(e * e)) for e in left])
 
 
 def _thinned(every: list[dict[str, float]]) -> list[dict[str, float]]:

@@ -19,9 +19,9 @@ The factor on F^e depends on depth δ and on the deepest depth so far; loading b
 - `weibull`: 1 − share (1 − e^(−q^n)) with q = (deepest − δ)/depth: bonds whose strengths are spread about a value
   (W. Weibull, A statistical distribution function of wide applicability, J. Appl. Mech. 18, 1951, 293–297), so that
   little of it goes close below the deepest point; 1 is `exponential`.
-- `two_ways`: as `exponential` on the way out, and `again` of it on the way back in, from one to the other within `turn`
-  of the way: rubber is stiffer as it is loaded anew than as it was unloaded (J. S. Bergström, M. C. Boyce, Constitutive
-  modeling of the large strain time-dependent behavior of elastomers, J. Mech. Phys. Solids 46, 1998, 931–954).
+- `two_ways`: as `exponential` on the way out, and `again` of it on the way back in, one to the other over `within`:
+  rubber is stiffer as it is loaded anew than as it was unloaded (J. S. Bergström, M. C. Boyce, Constitutive modeling of
+  the large strain time-dependent behavior of elastomers, J. Mech. Phys. Solids 46, 1998, 931–954).
 - `conditioning`: as `exponential`, with a share that takes some cycles to be whole: share (1 − lacks · e^(−N/takes)),
   N how often the probe has come back near the deepest depth (9/10 of it) from half of it or less (J. Diani, B. Fayolle,
   P. Gilormini, as above, on filled rubber, most of whose softening is in the first cycles and not in the first alone).
@@ -172,8 +172,8 @@ def weibull(dt: float, depth: float, state: State, p: State) -> float:
 
 @block
 def two_ways(dt: float, depth: float, state: State, p: State) -> float:
-    """Factor on F^e; p = (share, depth, again, turn, already); state: the deepest depth, how far it is on its way out,
-    the depth before."""
+    """Factor on F^e; p = (share, depth, again, within, already); state: the deepest depth, how far it is on its way
+    out, the depth before."""
     here = max(depth, 0.0)
     state[0] = max(state[0], here, p[4])
     state[1] = min(max(state[1] - (here - state[2]) / p[3], 0.0), 1.0)
@@ -364,7 +364,7 @@ EFFECT = Effect(
                 _SHARE,
                 _DEPTH,
                 Parameter("again", "1", 0.0, 1.0, 0.7, "what is left of it on the way back in", starts=(0.7,)),
-                Parameter("turn", "mm", 1e-3, 10.0, 0.1, "way from the one to the other", starts=(0.05, 0.2)),
+                Parameter("within", "mm", 1e-3, 10.0, 0.1, "way from the one to the other", starts=(0.05, 0.2)),
                 _ALREADY,
             ),
             sought=False,
