@@ -37,7 +37,7 @@ LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
 BENDS_AT = (0.08, 0.14, 0.2, 0.28, 0.38, 0.5, 0.7)  # of the depth reached
 MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
-TURNS = (0.2, 0.35, 0.6, 1.0, 1.7)  # of the depth reached, after which a width may repeat
+TURNS = (0.2, 0.35, 0.6, 1.0, 1.6)  # of the depth reached, after which a width may repeat
 FRESH = 0.9  # of the depth reached, beyond which a softening pad must go for the first time in the run
 EVERY = tuple(0.1 * 1.1**k for k in range(24))  # of the run
 COARSE = 500  # samples in which what the load changes is counted: in finer ones noise would count
@@ -167,6 +167,7 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
     elif p.name == "limit" and p.unit == "N":
         starts = tuple(share * reach.force_N for share in (0.6, 0.8, 0.93, 0.985))
     elif p.name == "turn":  # worn where it is used, or once about after each turn of what drives it
+        upper = min(upper, LONGEST_PERIOD * reach.depth_mm)
         starts = tuple(share * reach.depth_mm for share in TURNS)
     elif p.name == "preload":  # a joint that opens beyond all forces is none
         lower, upper = 0.02 * reach.force_N, reach.force_N

@@ -95,7 +95,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     floor = _floor(prepared, final)
     fits, squares, excess = _needed(prepared, path, final, floor)
     whole = _whole(prepared, fits, search.believed)
-    while (gone := _gone(fits, whole[1], excess)) is not None:
+    while (gone := _gone(prepared.full, fits, whole[1], excess)) is not None:
         fits, squares, excess = _dropped(prepared, path, fits, gone, floor)
         whole = _whole(prepared, fits, search.believed)
     return _concluded(m, believed, prepared, flags, search, path, fits, whole, squares, excess, floor, begun)
@@ -223,17 +223,25 @@ def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fi
     """First and last fit carried to the end on all the data, with the hum that the last one then has to make."""
     full, data, mains = prepared.full, prepared.full, prepared.mains
     before, last = onto(fits[0], full, 6, 1e-8), replace(fits[-1], x=missing_told(fits[-1], believed))
-    if mains is None:
+    after = None if mains is None else _with_hum(prepared, last, mains)
+    if after is None:
         after = onto(last, full, 6, 1e-8)
     else:
-        data, structure = prepared.raw, last.structure.with_cause(hum_cause(_retimed(prepared, last, mains)))
-        hum = structure.of_cause(len(structure.causes) - 1)
-        own = structure.x(last.x[: len(structure.pad.coordinates)], None)[hum]
-        after = refit(data, structure, extended(last, own), 8, 1e-8)
+        data = prepared.raw
     after = _spread(prepared, data, after)
     if prepared.felt.total_N.any():
         before, after = placed(full, before), placed(data, after)
     return before, after
+
+
+def _with_hum(prepared: Prepared, last: Fit, mains: Line) -> Fit | None:
+    """A fit with the hum that it has to make beside; None where all together make next to none, and what swings in the
+    holds does not in the rest (a ceiling's ripple)."""
+    structure = last.structure.with_cause(hum_cause(_retimed(prepared, last, mains)))
+    hum = structure.of_cause(len(structure.causes) - 1)
+    own = structure.x(last.x[: len(structure.pad.coordinates)], None)[hum]
+    after = refit(prepared.raw, structure, extended(last, own), 8, 1e-8)
+    return after if structure.values(after.x)[-1]["amplitude"] >= FADED * mains.amplitude_N else None
 
 
 def _retimed(prepared: Prepared, fit: Fit, mains: Line) -> Line:
@@ -250,9 +258,9 @@ def _retimed(prepared: Prepared, fit: Fit, mains: Line) -> Line:
     return line if line is not None and near and line.of_the_mains else mains
 
 
-def _gone(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
+def _gone(full: Data, fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     """Number of a cause that is none once all is fitted together; None: all are."""
-    for number in (_faded(fits, whole), _untold(fits, whole, excess), _anothers(fits, whole, excess)):
+    for number in (_faded(fits, whole), _untold(fits, whole, excess), _anothers(full, fits, whole, excess)):
         if number is not None:
             return number
     return None
@@ -280,7 +288,7 @@ def _untold(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     return None
 
 
-def _anothers(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
+def _anothers(full: Data, fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
     """Number of a cause that does nothing, but split the steps in which others are worked out or stand for noise; or of
     a further one that takes little and is another's limit, with a number at its bound; None: there is none."""
     own, values = len(fits[0].structure.causes), whole.structure.values(whole.x)
@@ -288,7 +296,7 @@ def _anothers(fits: list[Fit], whole: Fit, excess: list[float]) -> int | None:
         index = own + k - 1
         cause = whole.structure.causes[index]
         little = k > 1 and excess[k - 1] - excess[k] < LITTLE * excess[0]
-        if no_size(whole, index) or (little and not cause.of_the_law and not within_bounds(cause, values[index])):
+        if no_size(full, whole, index) or (little and not cause.of_the_law and not within_bounds(cause, values[index])):
             return k - 1
     return None
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .data import Prepared
+from .data import Data, Prepared
 from .evidence import CRUMB, RIVAL, tempered, unexplained
 from .held_out import held_out_square
 from .late import LATE
@@ -22,6 +22,7 @@ EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
 UNSEEN = 0.2  # of the noise power: what no test of structure sees of what is left; so far off may the noise be told
 TOLD_SIZE = 0.25  # of a cause's size, that its standard deviation may be for a sure name
+UNFELT = 16.0  # of χ²
 NOTHING = 0.1  # of its standard deviation, that a size is
 HARDLY = 0.3  # sure of a name
 SLIGHT, SLIGHTLY = 0.02, 0.65  # of the error: how sure a cause that takes less beside another can be. In a campaign two
@@ -206,13 +207,17 @@ def told_size(final: Fit, index: int) -> float:
     return _of_its_size(final.structure.causes[index], described(final, index)[2])
 
 
-def no_size(final: Fit, index: int) -> bool:
-    """Whether a fit's cause does nothing: its size is nothing, or far within its own deviation."""
+def no_size(data: Data, final: Fit, index: int) -> bool:
+    """Whether a fit's cause does nothing: its size is nothing, or far within its own deviation and not felt in the
+    force either. One that is felt has numbers of its shape that are hardly told, and it is that."""
     size, numbers = final.structure.causes[index].amplitude, described(final, index)[2]
     if size is None or size.fixed or size.name not in numbers:
         return False
     number = numbers[size.name]
-    return number.value == 0.0 or abs(number.value) < NOTHING * number.std
+    if number.value == 0.0 or abs(number.value) >= NOTHING * number.std:
+        return number.value == 0.0
+    felt = data.whitened(force_at(data, final.structure, final.x) - force_at(data, *reduced(final, index)))
+    return float(np.sum(felt * felt)) < UNFELT
 
 
 def _of_its_size(cause: Cause, numbers: Mapping[str, Number]) -> float:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
+
+from bench.diagnose.verdict import no_size
+from tests.bench.diagnose.test_shapes import fitted
 
 module = importlib.import_module("bench.diagnose.diagnose")
 
@@ -156,10 +161,22 @@ def test_a_cause_that_does_nothing_goes_and_a_further_one_that_is_anothers_limit
 ):
     """A mode as fast as the sampling beside a lag; a skew of nothing beside a film that tears within a step."""
     causes = tuple(SimpleNamespace(number=k, of_the_law=False) for k in range(2))
-    monkeypatch.setattr(module, "no_size", lambda whole, index: nothing[index])
+    monkeypatch.setattr(module, "no_size", lambda data, whole, index: nothing[index])
     monkeypatch.setattr(module, "within_bounds", lambda cause, values: within[cause.number])
     whole: Any = SimpleNamespace(structure=SimpleNamespace(causes=causes, values=lambda x: [{}, {}]), x=None)
     fits: list[Any] = [SimpleNamespace(structure=SimpleNamespace(causes=causes[:k])) for k in range(3)]
-    assert module._anothers(fits, whole, excess) == gone
+    assert module._anothers(None, fits, whole, excess) == gone
     causes[1].of_the_law = True  # it is one at any of its numbers
-    assert module._anothers(fits, whole, excess) == (gone if any(nothing) else None)
+    assert module._anothers(None, fits, whole, excess) == (gone if any(nothing) else None)
+
+
+@pytest.mark.parametrize("gap_mm", [0.03, 1e-7])
+def test_a_size_that_is_hardly_told_is_nothing_only_where_the_force_does_not_feel_it(gap_mm):
+    """The mean width of a play that goes on growing along the way may be anything; without it the fit is far off."""
+    _, prepared, fit = fitted("backlash", "worn", "running_out", 1.5, rate_hz=60.0)
+    (values,) = fit.structure.values(fit.x)
+    structure = fit.structure.with_cause_at(0, fit.structure.causes[0].with_start(**values | {"gap": gap_mm}))
+    x = structure.x(fit.x[: len(structure.pad.coordinates)])
+    unsure = replace(fit, structure=structure, x=x, spread=1e6 * np.eye(len(x)))
+    assert no_size(prepared.full, unsure, 0) == (gap_mm < 1e-6)
+    assert no_size(prepared.full, replace(unsure, spread=1e-12 * np.eye(len(x))), 0) is False

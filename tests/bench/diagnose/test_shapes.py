@@ -212,3 +212,24 @@ def test_a_number_about_which_the_cost_only_jumps_has_a_standard_error(monkeypat
     assert 0.05 <= np.sqrt(spread._by_steps(None, fit, 0)) < 0.08  # on both sides
     monkeypatch.setattr(spread, "chi2", lambda data, structure, x: 100.0)
     assert spread._by_steps(None, fit, 0) == 0.0
+
+
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_the_numbers_of_another_shape_begin_where_they_fit_best(seed: int) -> None:
+    """A screw worn where it is used most: the place of that is told by no number of a play."""
+    c, prepared, fit = fitted("backlash", "worn", "play", 1.5, seed)
+    play = fit.structure.causes[0]
+    form = candidates.narrowed(
+        play.effect.form("running_out"), candidates.Reach.of(prepared.short, fit.structure, 0.01)
+    )
+    like = candidates.alike(fit, 0, cause_of(play.effect, form))
+    begun = shapes.begun_anew(prepared.short, fit, 0, like)
+    assert {c.start["gap"] for c in begun} == {like.start["gap"]}
+
+    def ended(cause: Any) -> float:
+        structure = fit.structure.with_cause_at(0, cause)
+        return refit(prepared.short, structure, structure.x(fit.x[: len(structure.pad.coordinates)]), 40, 1e-9).chi2
+
+    best, depth_mm = min(ended(cause) for cause in begun), c.truth.drawn.depth_mm
+    assert best < 1.01 * ended(like.with_start(turn=depth_mm, swell=0.3, angle=-np.pi / 2))
+    assert best < ended(like)
