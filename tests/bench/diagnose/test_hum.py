@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bench.diagnose.hum import find
+from bench.diagnose.data import prepare
+from bench.diagnose.diagnose import _with_hum, believed_structure
+from bench.diagnose.hum import Line, find
 from bench.diagnose.noise import Part
+from bench.diagnose.refit import onto, refit
+from sim.model import Model
+from tests.bench.diagnose.small import measurement
+from tests.truth.cases import draw_case
 
 Array = np.ndarray
 
@@ -46,3 +54,20 @@ def test_a_sine_has_no_harmonics_where_they_would_be_folded_beside_it(rate_hz, s
     assert line is not None
     assert (line.ratio, line.higher, line.fires_rad) == (0.0, (), 0.0)
     assert np.sqrt(np.mean((line.force_N(t, force) - hum) ** 2)) < 0.02 * 0.04
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_swings_in_the_holds_alone_is_no_hum(seed):
+    """A ceiling ripples, and where the force is at it in the holds a line is found there."""
+    for size_N, hummed in ((0.02, True), (0.0, False)):
+        c = draw_case(seed, (), protocol="staircase", rate_hz=300.0, noise_N=0.005)
+        m = measurement(c)
+        line = Line(50.0, 0.02, 0.3, 0.0, 0.0)
+        m = replace(m, force_N=m.force_N + size_N * np.sin(2 * np.pi * 50.0 * m.force_time_s + 0.3))
+        prepared = prepare(m, np.ones(len(m.force_N), dtype=bool))
+        structure = believed_structure(Model.from_dict(c.believed), prepared)
+        fit = refit(prepared.short, structure, structure.x(structure.pad.x()), 30, 1e-8)
+        found = _with_hum(prepared, onto(fit, prepared.full), line)
+        assert (found is not None) == hummed
+        if found is not None:
+            assert found.structure.values(found.x)[-1]["amplitude"] == pytest.approx(size_N, rel=0.1)
