@@ -191,7 +191,7 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
         id_, form, numbers = described(final, own + k)
         cause = final.structure.causes[own + k]
         values = {name: number.value for name, number in numbers.items()}
-        most = min(_of_its_size(cause, numbers), most_sure(cause.effect, search.reach.rich))
+        most = min(told_size(final, own + k), most_sure(cause.effect, search.reach.rich))
         most = min(most, SLIGHTLY) if len(gains) > 1 and gain < SLIGHT else most
         confidence, kind = min(confidence, most), min(kind, most)
         out.append(
@@ -204,7 +204,27 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
 
 def told_size(final: Fit, index: int) -> float:
     """How sure the name of a fit's cause can be at the most, as its size is told."""
-    return _of_its_size(final.structure.causes[index], described(final, index)[2])
+    cause, numbers = final.structure.causes[index], described(final, index)[2]
+    size = cause.amplitude
+    if size is not None and size.name in numbers:
+        number = numbers[size.name]
+        numbers = {**numbers, size.name: replace(number, std=number.std * _given_its_course(final, index, size.name))}
+    return _of_its_size(cause, numbers)
+
+
+def _given_its_course(final: Fit, index: int, name: str) -> float:
+    """By what a number of a fit's cause is better told where its course is given: half waves over the data tell when
+    the cause was how large, and any one time's share of that is told less well than all of it."""
+    fitted, at = final.structure.causes[index].fitted, final.structure.of_cause(index)
+    own = at.start + [p.name for p in fitted].index(name)
+    waves = [at.start + k for k, p in enumerate(fitted) if p.spread is not None]
+    told = np.diag(final.covariance()) > 0.0
+    if not waves or not told[own]:
+        return 1.0
+    chosen = [own, *(k for k in waves if told[k])]
+    spread = np.sqrt(np.diag(final.covariance())[chosen])
+    shared = final.covariance()[np.ix_(chosen, chosen)] / np.outer(spread, spread)
+    return float(1.0 / np.sqrt(max(np.linalg.pinv(shared, rcond=1e-9)[0, 0], 1.0)))
 
 
 def no_size(data: Data, final: Fit, index: int) -> bool:

@@ -12,6 +12,8 @@ first sample in all forms.
 - `bent`: rate · t until a time, and a share of that rate from there on, as where a door is opened or a heater goes off.
 - `two_bodies`: a share of it settles within τ, the rest within `later` times as long: gauge and body of a cell.
 - `quickening`: rate · t (1 + t/2τ), as a supply that ends: twice as quick at τ.
+- `wandering`: rate · (t + Σ c_k (sin(kπ t/T) T/kπ − t)), k from 1 to 8, over the length T of the data, so that the rate
+  swings by half waves: as where a heater goes on and off, or a zero walks. `at_time` is their middle, T/2.
 - `rezeroed`: rate · (t mod `every`), as where a device finds its zero anew at even distances (OIML R 76-1,
   Non-automatic weighing instruments: devices that set zero by themselves).
 
@@ -23,6 +25,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.stamps import HALF_TIME, half_waves
 from sim.jit import State, block
 
 
@@ -86,6 +89,17 @@ def turning(dt: float, force: float, state: State, p: State) -> float:
 
 
 @block
+def wandering(dt: float, force: float, state: State, p: State) -> float:
+    """Half waves of the rate; p = (rate, wave_1 to wave_8, at_time)."""
+    state[0] += dt
+    slow = 0.5 * math.pi / max(p[9], 1e-9)
+    way = state[0]
+    for k in range(1, 9):
+        way += p[k] * (math.sin(k * slow * state[0]) / (k * slow) - state[0])
+    return force + p[0] * way
+
+
+@block
 def quickening(dt: float, force: float, state: State, p: State) -> float:
     """Quicker and quicker; p = (rate, time_constant)."""
     state[0] += dt
@@ -99,6 +113,7 @@ def bent(dt: float, force: float, state: State, p: State) -> float:
     return force + p[0] * (min(state[0], p[2]) + p[1] * max(state[0] - p[2], 0.0))
 
 
+_WAVES = 8
 _RATE = Parameter("rate", "N/s", -1e4, 1e4, 0.002, "rate at the first sample", required=True, amplitude=True)
 
 
@@ -171,6 +186,14 @@ EFFECT = Effect(
             parameters=(_RATE, _time_constant("time after which it is twice as quick")),
             sought=False,
             blocks={"sensor": quickening},
+            state=(0.0,),
+        ),
+        Form(
+            name="wandering",
+            what="now quicker and now slower, and back",
+            parameters=(_RATE, *half_waves(_WAVES, 1.0, "over the data, of the rate's fall, over `rate`"), HALF_TIME),
+            sought=False,
+            blocks={"sensor": wandering},
             state=(0.0,),
         ),
         Form(

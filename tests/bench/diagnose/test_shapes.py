@@ -17,6 +17,7 @@ from bench.diagnose.numbers import Coordinate, cause_of
 from bench.diagnose.refit import Fit, onto, refit
 from bench.diagnose.shapes import departed, reshaped
 from bench.diagnose.spread import covariance, of_the_noise
+from bench.diagnose.verdict import told_size
 from sim.effects import effect
 from sim.model import Model
 from sim.relaxation import Relaxation
@@ -233,3 +234,31 @@ def test_the_numbers_of_another_shape_begin_where_they_fit_best(seed: int) -> No
     best, depth_mm = min(ended(cause) for cause in begun), c.truth.drawn.depth_mm
     assert best < 1.01 * ended(like.with_start(turn=depth_mm, swell=0.3, angle=-np.pi / 2))
     assert best < ended(like)
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_a_drift_that_comes_and_goes_has_a_course(seed: int) -> None:
+    """The sun shines on it, and clouds come."""
+    _, prepared, fit = fitted("force_drift", "clouds", "linear", 1.5, seed)
+    done = reshaped(prepared.short, refit(prepared.short, fit.structure, fit.x, 20, 1e-8))
+    assert done.structure.causes[0].form.name == "wandering"
+    noise = np.count_nonzero(prepared.short.weight > 0)
+    assert done.chi2 - noise < 0.2 * (fit.chi2 - noise)
+
+
+def test_a_size_is_as_sure_as_it_is_where_its_course_is_given() -> None:
+    """The rate at one moment is hardly told, and that it drifts is beyond doubt; two bodies have no course."""
+    drift = effect("force_drift")
+    wandering = cause_of(drift, drift.form("wandering"), {"rate": 0.002})
+    alike = np.full((9, 9), 0.9) + 0.1 * np.eye(9)
+    for cause, sure in ((wandering, 1.0), (cause_of(drift, drift.form("two_bodies"), {"rate": 0.002}), 0.3125)):
+        count = len(cause.fitted)
+        structure = SimpleNamespace(
+            causes=(cause,),
+            of_cause=lambda index, count=count: slice(0, count),
+            values=lambda x, cause=cause: [dict(cause.start)],
+            coordinates=[Coordinate(p.name, -9.0, 9.0, unit=0.0008) for p in cause.fitted],
+        )
+        spread = alike[:count, :count]
+        final: Any = SimpleNamespace(structure=structure, x=np.zeros(count), covariance=lambda spread=spread: spread)
+        assert told_size(final, 0) == pytest.approx(sure)
