@@ -46,6 +46,7 @@ SLOWED = (2, 3, 4)  # samples that a channel says one value for, when it is for 
 BESIDE = 5  # neighbours on either side that a stray sample is held against: bursts are shorter
 ASIDE, CALM = 8, 0.6  # neighbours on either side of a force or a residual, and their share that a burst leaves alone
 FAR = 6.0  # noise deviations that an outlier stands off at the least
+COARSELY = 12.0  # the same, in a channel so coarse that no tail is foretold
 FEW, ALONE = 3, 1.7  # outliers that are a fault; and times further off is one that is no fault, but no noise either
 HEAPS = 3.0  # steps of a coarse channel within which its noise is
 NEXT = 1.5  # steps: the value next to the one that stands is none that stands off, however seldom it comes
@@ -361,7 +362,11 @@ def _spikes(force: Array, good: Mask) -> Mask:
     reach = spread[-3] - spread[2]  # in a move the neighbours themselves lie apart
     off = np.abs(y - middle)
     quiet = reach <= np.quantile(reach, 0.5)  # in holds the differences are noise alone
-    limit = max(far((y - middle)[quiet]), FAR * noise)
+    limit = far((y - middle)[quiet])
+    if not np.isfinite(limit):  # most of a coarse channel's values are the one between their neighbours
+        heaps = (y - middle)[np.abs(y - middle) <= HEAPS * resolution(force)]
+        limit = max(COARSELY * float(np.sqrt(np.mean(heaps**2))), LEAPS * resolution(force))
+    limit = max(limit, FAR * noise)
     mask[index[_beyond(off, np.full(len(y), limit), 2.0 * reach)]] = True
     return mask
 
@@ -374,7 +379,8 @@ def _beyond(off: Array, limit: Array, reach: Array) -> Mask:
 
 
 def far(values: Array) -> float:
-    """Distance from 0 beyond which a value (n,) is no noise, by the tail that its bulk foretells (Student's t).
+    """Distance from 0 beyond which a value (n,) is no noise, by the tail its bulk foretells (Student's t); infinite
+    where most values are 0.
 
     Degrees and scale are those under which the values within `BULK` medians are likeliest, counted in bins: what lies
     further out has no say.

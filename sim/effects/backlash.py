@@ -9,7 +9,7 @@
   under load. Deflection gap · (1 − e^(−|F|/closing_force)) in the force's direction, solved with the pad.
 - `running_out`: the width goes with the place, gap · (1 + swell · sin(2π x/turn + angle)): a gear, pulley or screw that
   runs out, or is worn where it is used most (ISO 230-2: the reversal value is stated for each
-  place). `gap` is the mean.
+  place). `gap` is the mean; `side` is 0 where the surface was found pushing, and 0.5 in `centred`.
 - `wearing`: gap · (1 + growth (t − at_time)), as of screws that work loose under load that comes and goes (G. H.
   Junker, New criteria for self-loosening of fasteners under vibration, SAE Technical Paper 690055, 1969), or of a nut
   that warms.
@@ -79,12 +79,12 @@ def gradual(dt: float, x: float, state: State, p: State) -> float:
 
 @block
 def running_out(dt: float, x: float, state: State, p: State) -> float:
-    """Probe side, from x to x + the gap there; p = (gap, swell, turn, angle, start)."""
+    """Probe side, about x by the gap there; p = (gap, swell, turn, angle, side, start)."""
     gap = p[0] * (1.0 + p[1] * math.sin(2.0 * math.pi * x / p[2] + p[3]))
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
-        state[1] = x + gap * p[4]
-    state[1] = min(max(state[1], x), x + gap)
+        state[1] = x + gap * (p[5] - p[4])
+    state[1] = min(max(state[1], x - p[4] * gap), x + (1.0 - p[4]) * gap)
     return state[1]
 
 
@@ -103,13 +103,13 @@ def closing(dt: float, x: float, state: State, p: State) -> float:
 
 @block
 def wearing(dt: float, x: float, state: State, p: State) -> float:
-    """Probe side, from x to x + what is open by then; p = (gap, growth, at_time). State: started, probe, time."""
+    """Probe side, about x by what is open by then; p = (gap, growth, side, at_time). State: started, probe, time."""
     state[2] += dt
-    gap = p[0] * max(1.0 + p[1] * (state[2] - p[2]), 0.0)
+    gap = p[0] * max(1.0 + p[1] * (state[2] - p[3]), 0.0)
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
         state[1] = x
-    state[1] = min(max(state[1], x), x + gap)
+    state[1] = min(max(state[1], x - p[2] * gap), x + (1.0 - p[2]) * gap)
     return state[1]
 
 
@@ -174,6 +174,9 @@ _GAP = Parameter(
     floor=("position_noise_mm", 2.0),
     starts=(0.01, 0.05),
 )
+_SIDE = Parameter(
+    "side", "1", 0.0, 1.0, 0.0, "where in the play the motor's own position lies (0: pushing side)", starts=(0.0, 0.5)
+)
 _START = Parameter("start", "1", 0.0, 1.0, 0.0, "where in the play the data begin (0: pushing side)", fixed=True)
 
 EFFECT = Effect(
@@ -216,6 +219,7 @@ EFFECT = Effect(
                 Parameter("swell", "1", 0.0, 1.0, 0.3, "how much wider, over the mean", starts=(0.3,)),
                 Parameter("turn", "mm", 0.1, 50.0, 1.0, "distance after which it is as wide", starts=(0.6, 1.1, 2.5)),
                 phase("angle", "phase of the width at position 0"),
+                _SIDE,
                 _START,
             ),
             sought=False,
@@ -228,6 +232,7 @@ EFFECT = Effect(
             parameters=(
                 _GAP,
                 Parameter("growth", "1/s", -0.2, 0.2, 0.0, "relative growth in time", starts=(-0.01, 0.01)),
+                _SIDE,
                 AT_TIME,
             ),
             sought=False,

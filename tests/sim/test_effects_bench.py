@@ -282,6 +282,12 @@ class TestBacklash:
         back = slice(1150, 2001)
         assert_allclose(probe[back] - x[back], gap[back], atol=1e-12)
 
+    @pytest.mark.parametrize(("name", "none"), [("running_out", {"swell": 0.0}), ("wearing", {"growth": 0.0})])
+    def test_a_play_that_changes_is_counted_from_where_a_plain_one_is(self, name: str, none: dict[str, float]) -> None:
+        for side, plain in ((0.0, "play"), (0.5, "centred")):
+            _, probe, _ = self.loop(name, gap=0.1, side=side, **none)
+            assert_allclose(probe[50:], self.loop(plain, gap=0.1)[1][50:], atol=1e-12)
+
     def test_what_has_opened_closes_again_by_itself(self) -> None:
         _, probe = Cascade(AIR, [active("backlash", "closing", gap=0.1, time_constant=0.5)]).probe(
             [0.0, 1.0, 1.01, 1.51, 1.52, 2.02], [0.0, 1.0, 0.8, 0.8, 0.78, 0.78]

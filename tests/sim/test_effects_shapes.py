@@ -341,7 +341,7 @@ def test_a_pull_that_is_the_same_up_to_its_range() -> None:
 
 def test_softening_that_is_less_on_the_way_back_in() -> None:
     x = np.interp(np.arange(701.0), [0.0, 200.0, 300.0, 500.0, 700.0], [0.0, 2.0, 1.0, 3.0, 2.0])
-    soft = active("stress_softening", "two_ways", share=0.3, depth=0.5, again=0.6, turn=0.1)
+    soft = active("stress_softening", "two_ways", share=0.3, depth=0.5, again=0.6, within=0.1)
     factor = simulate(LINEAR, [soft], np.arange(x.size, dtype=float), x)[1:] / (K * x[1:])
     below = np.maximum.accumulate(x)[1:] - x[1:]
     out, back = np.s_[215:299], np.s_[315:399]

@@ -84,3 +84,18 @@ def test_a_force_that_stands_in_a_wide_step_is_not_stuck(seed):
     m = replace(measurement(c), force_N=step_N * np.round((c.truth.clean_N + noise_N) / step_N))
     d = diagnose(m, Model.from_dict(c.believed))
     assert d.verdict == "consistent" and not any(mask.any() for mask in d.flags.values())
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("noise", [0.0, 0.2, 0.4, 0.6], ids=lambda noise: f"noise of {noise} steps")
+def test_bad_frames_show_in_a_channel_of_which_most_values_are_their_neighbours_middle(noise, seed):
+    """Then no tail of the noise is foretold; and a channel as coarse without bad frames has none."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(6000) / 300.0
+    force_steps = 60.0 * np.clip(np.sin(0.6 * t), 0.0, 0.7) + noise * rng.standard_normal(t.size)
+    channel_N = 0.008 * np.round(force_steps)
+    assert not faults(channel_N).outlier.any()
+    bad = rng.choice(t.size, 40, replace=False)
+    channel_N[bad] = -10.5
+    found = faults(channel_N).outlier
+    assert found[bad].mean() > 0.9 and found.sum() <= len(bad)
