@@ -67,12 +67,13 @@ def halted(force_N: Array, modelled_N: Array, but: Mask, noise_N: float) -> Mask
 
 def _left(m: Measurement, prepared: Prepared, fit: Fit) -> tuple[Array, Array]:
     """What a fit leaves of each force sample (m,), nan where that was not fitted; and its force there, N. Less is left
-    where errors of the positions make much, as much less as they make the noise larger: there is the motion astray."""
+    where errors of the positions make much, as much less as they make the noise larger: there is the motion astray. So
+    it is where the noise is loud, and more where it is not."""
     full, at = prepared.full, prepared.at
     errors, modelled = np.full(len(m.force_N), np.nan), m.force_N.copy()
     modelled[prepared.kept] = force_at(full, fit.structure, fit.x)[at]
-    noise_N = prepared.noise.force_N
-    surely = noise_N / np.hypot(noise_N, prepared.felt.total_N[at])
+    noise_N = prepared.noise.at(modelled[prepared.kept])
+    surely = prepared.noise.force_N / np.hypot(noise_N, prepared.felt.total_N[at])
     errors[prepared.kept] = surely * (full.force_N[at] - modelled[prepared.kept])
     return errors, modelled
 

@@ -277,7 +277,8 @@ def prepare(m: Measurement, good: Mask) -> Prepared:
         m = replace(m, force_N=m.force_N - taken_N)
     motion = felt(m.position_time_s, m.position_mm)
     noise = force_noise(m, good)
-    sigma_force = max(noise.force_N, rounded(m.force_N[good], resolution(m.force_N)), least_N(m))
+    least = max(rounded(m.force_N[good], resolution(m.force_N)), least_N(m))
+    sigma_force = max(noise.force_N, least)
     grid, where = union(motion.time_s, m.force_time_s)
     position = motion.at(grid)
     stiffness = stiffness_along(m)
@@ -288,7 +289,7 @@ def prepare(m: Measurement, good: Mask) -> Prepared:
     # a hold or a planned move is off as a whole; elsewhere windows of neighbours share what they share
     whole = np.where(stretch[where] > 0, 1.0, np.sqrt(0.5))
     shared[where] = whole * through
-    sigma[where] = np.hypot(sigma_force, np.sqrt(1.0 - whole**2) * through)
+    sigma[where] = np.hypot(np.maximum(noise.at(m.force_N), least), np.sqrt(1.0 - whole**2) * through)
     stretch = np.unique(stretch, return_inverse=True)[1]
     weight[where] = counted
     force[where], hum[where] = m.force_N, np.where(counted, taken_N, 0.0)

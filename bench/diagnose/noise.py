@@ -1,7 +1,8 @@
 """How noisy the force is, sample by sample, and how much neighbouring samples say the same thing.
 
-σ² = σ_F² + (K σ_x)²: the force's own noise, and what is left of the position's through the local stiffness. The colour
-is that of a Gauss–Markov process with white noise beside it, ρ_k = a φ^k.
+σ² = σ_F² + (K σ_x)²: the force's own noise, which may grow with the force (`uneven`), and what is left of the
+position's through the local stiffness. The colour is that of a Gauss–Markov process with white noise beside it,
+ρ_k = a φ^k.
 
 Both are matched to how far the means of three neighbouring stretches of a hold are off a line, stretches of 1, 2, 4 …
 samples (the three-sample variance of clocks: R. A. Baugh, Proc. 25th Freq. Control Symp., 1971, 222–225). Noise does
@@ -11,7 +12,7 @@ for a while, swings or wanders in the holds is none, and is told from it by that
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ from scipy.stats import chi2 as chi2_law
 
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
+
+from .uneven import share_of_force
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -57,11 +60,20 @@ class Colour:
 
 @dataclass(frozen=True)
 class ForceNoise:
-    """`force_N`: standard deviation of the force alone; `from_holds`: else from motion."""
+    """`force_N`: standard deviation of the force alone, RMS over the data; `from_holds`: else from motion. Where
+    `share` is not 0, it is `air_N` in air, and `share` of the force adds to that in squares."""
 
     force_N: float
     colour: Colour
     from_holds: bool
+    air_N: float = 0.0
+    share: float = 0.0
+
+    def at(self, force_N: Array) -> Array:
+        """Standard deviations at forces (n,), N."""
+        if self.share == 0.0:
+            return np.full(len(force_N), self.force_N)
+        return np.asarray(np.hypot(self.air_N, self.share * force_N))
 
 
 Part = tuple[Array, Array, Array]
@@ -90,10 +102,16 @@ def hold_errors(m: Measurement, good: Mask) -> list[Part]:
 
 def force_noise(m: Measurement, good: Mask) -> ForceNoise:
     """Of the force samples (m,) that are `good`, about smooth curves through the holds."""
-    parts = [(e, Q) for _, e, Q in hold_errors(m, good)]
-    if sum(len(e) for e, _ in parts) < 40:
+    parts, sample_s = hold_errors(m, good), float(np.median(np.diff(m.force_time_s)))
+    if sum(len(e) for _, e, _ in parts) < 40:
         return ForceNoise(_from_motion(m.force_N[good]), Colour(), False)
-    return _matched(parts, float(np.median(np.diff(m.force_time_s))))
+    curves = [np.interp(t, m.force_time_s, m.force_N) - e for t, e, _ in parts]
+    share = share_of_force([e for _, e, _ in parts], [float(np.sqrt(np.mean(y**2))) for y in curves])
+    if share == 0.0:
+        return _matched([(e, Q) for _, e, Q in parts], sample_s)
+    in_air = _matched([(e / np.hypot(1.0, share * y), Q) for (_, e, Q), y in zip(parts, curves, strict=True)], sample_s)
+    noise = replace(in_air, air_N=in_air.force_N, share=share * in_air.force_N)
+    return replace(noise, force_N=float(np.sqrt(np.mean(noise.at(m.force_N[good]) ** 2))))
 
 
 def _about_curve(t: Array, y: Array) -> tuple[Array, Array]:
