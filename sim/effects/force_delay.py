@@ -1,7 +1,7 @@
 """Force delay: a force sample was felt `delay` before its stamp, for transport, conversion or filtering on the way.
 
 - `constant`: the same for every sample.
-- `wandering`: delay · (1 + Σ c_k cos(kπ t/T)), k from 1 to 6, over the length T of the data, as of a network that is
+- `wandering`: delay · (1 + Σ c_k cos(kπ t/T)), k from 1 to 12, over the length T of the data, as of a network that is
   now more and now less busy (V. Paxson, End-to-end internet packet dynamics, IEEE/ACM Trans. Netw. 7, 1999, 277–292).
   `at_time` is the middle of the data, T/2, so that `delay` is its mean over them.
 
@@ -34,7 +34,7 @@ def wandering(values: Mapping[str, float], stamp_s: Array) -> Array:
     return np.asarray(stamp_s - values["delay"] * np.maximum(1.0 + more, 0.0))
 
 
-_WAVES = 6
+_WAVES = 12
 _DELAY = Parameter(
     "delay",
     "s",

@@ -12,7 +12,7 @@ first sample in all forms.
 - `bent`: rate · t until a time, and a share of that rate from there on, as where a door is opened or a heater goes off.
 - `two_bodies`: a share of it settles within τ, the rest within `later` times as long: gauge and body of a cell.
 - `quickening`: rate · t (1 + t/2τ), as a supply that ends: twice as quick at τ.
-- `wandering`: rate · (t + Σ c_k (sin(kπ t/T) T/kπ − t)), k from 1 to 8, over the length T of the data, so that the rate
+- `wandering`: rate · (t + Σ c_k (sin(kπ t/T) T/kπ − t)), k from 1 to 12, over the length T of the data, so that the rate
   swings by half waves: as where a heater goes on and off, or a zero walks. `at_time` is their middle, T/2.
 - `rezeroed`: rate · (t mod `every`), as where a device finds its zero anew at even distances (OIML R 76-1,
   Non-automatic weighing instruments: devices that set zero by themselves).
@@ -90,11 +90,11 @@ def turning(dt: float, force: float, state: State, p: State) -> float:
 
 @block
 def wandering(dt: float, force: float, state: State, p: State) -> float:
-    """Half waves of the rate; p = (rate, wave_1 to wave_8, at_time)."""
+    """Half waves of the rate; p = (rate, wave_1 to wave_12, at_time)."""
     state[0] += dt
-    slow = 0.5 * math.pi / max(p[9], 1e-9)
+    slow = 0.5 * math.pi / max(p[13], 1e-9)
     way = state[0]
-    for k in range(1, 9):
+    for k in range(1, 13):
         way += p[k] * (math.sin(k * slow * state[0]) / (k * slow) - state[0])
     return force + p[0] * way
 
@@ -113,7 +113,7 @@ def bent(dt: float, force: float, state: State, p: State) -> float:
     return force + p[0] * (min(state[0], p[2]) + p[1] * max(state[0] - p[2], 0.0))
 
 
-_WAVES = 8
+_WAVES = 12
 _RATE = Parameter("rate", "N/s", -1e4, 1e4, 0.002, "rate at the first sample", required=True, amplitude=True)
 
 

@@ -250,7 +250,7 @@ def test_a_size_is_as_sure_as_it_is_where_its_course_is_given() -> None:
     """The rate at one moment is hardly told, and that it drifts is beyond doubt; two bodies have no course."""
     drift = effect("force_drift")
     wandering = cause_of(drift, drift.form("wandering"), {"rate": 0.002})
-    alike = np.full((9, 9), 0.9) + 0.1 * np.eye(9)
+    alike = np.full((13, 13), 0.9) + 0.1 * np.eye(13)
     for cause, sure in ((wandering, 1.0), (cause_of(drift, drift.form("two_bodies"), {"rate": 0.002}), 0.3125)):
         count = len(cause.fitted)
         structure = SimpleNamespace(
