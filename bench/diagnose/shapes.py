@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 STEPS, STARTS = 8, 12  # of the fit of another shape
 LONGER, ROOM = 6, 1.5  # starts with longer periods, of each shape; times a period, that the longest must be for them
+LARGER = (5.0, 25.0)  # times the size found, from which a course is begun too
 FEW, TRIED = 3, 2  # steps of the best starts
 NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
@@ -167,11 +168,10 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     cause, end = structure.causes[index], len(structure.pad.coordinates)
     shape = narrowed(form, Reach.of(short, structure, short.sample_s))
     told = {p.name: values[index][p.name] for p in shape.parameters if p.name in values[index]}
-    begun = [told | own for own in [{}, *_own(shape, told), *_thinned(list(combinations(shape)))]]
-    placed = [_in_place(lead, index, cause_of(cause.effect, shape, start), lead.x[:end]) for start in begun]
-    chi2 = _chi2(short, placed)
-    best_first = [placed[k] for k in np.argsort(chi2, kind="stable") if np.isfinite(chi2[k])]
-    tried = [refit(short, joined, x, FEW, NEARLY) for joined, x in best_first[:TRIED]]
+    like = cause_of(cause.effect, shape, told)
+    begun = [like.with_start(**own) for own in [{}, *_own(shape, told), *_thinned(list(combinations(shape)))]]
+    chosen = _best_placed(short, lead, index, begun) + with_a_course(like)
+    tried = [refit(short, *_in_place(lead, index, c, lead.x[:end]), FEW, NEARLY) for c in chosen]
     if not tried:
         return None
     best = min(tried, key=lambda fit: fit.chi2)
@@ -183,9 +183,29 @@ def begun_anew(short: Data, lead: Fit, index: int, like: Cause) -> list[Cause]:
     """Another shape of a cause of a fit, `like` that one in the numbers that they share, with its own begun elsewhere:
     where it fits best so."""
     told = set(lead.structure.causes[index].start)
-    causes = [like.with_start(**own) for own in _own(like.form, told)]
-    placed = [_in_place(lead, index, cause, lead.x[: len(lead.structure.pad.coordinates)]) for cause in causes]
-    chi2 = _chi2(short, placed)
+    return [
+        *_best_placed(short, lead, index, [like.with_start(**o) for o in _own(like.form, told)]),
+        *with_a_course(like),
+    ]
+
+
+def with_a_course(cause: Cause) -> list[Cause]:
+    """A cause that is now more and now less over the data, begun from larger sizes: what comes and goes is little on
+    the average, and its half waves, of that size, are much."""
+    size = cause.amplitude
+    if size is None or all(p.spread is None for p in cause.fitted):
+        return []
+    larger = [times * cause.start[size.name] for times in LARGER]
+    return [cause.with_start(**{size.name: min(max(value, size.lower), size.upper)}) for value in larger]
+
+
+def _best_placed(short: Data, lead: Fit, index: int, causes: Sequence[Cause]) -> list[Cause]:
+    """The best of some causes in a place of a fit, as they stand there."""
+    pad = lead.x[: len(lead.structure.pad.coordinates)]
+    placed = [_in_place(lead, index, cause, pad) for cause in causes]
+    forces = [force_at(short, structure, x) for structure, x in placed]
+    left = [short.whitened(short.force_N - f) if np.isfinite(f).all() else np.array([np.inf]) for f in forces]
+    chi2 = np.array([float(np.sum(e * e)) for e in left])
     return [causes[k] for k in np.argsort(chi2, kind="stable")[:TRIED] if np.isfinite(chi2[k])]
 
 
@@ -193,13 +213,6 @@ def _own(form: Form, told: Collection[str]) -> list[dict[str, float]]:
     """Values to start from of what is not told; none where all is."""
     fresh = replace(form, parameters=tuple(p for p in form.parameters if p.name not in told))
     return _thinned([values for values in combinations(fresh) if values])
-
-
-def _chi2(short: Data, placed: Sequence[tuple[Structure, Array]]) -> Array:
-    """χ² of each structure as it stands; infinite where it makes no plant."""
-    forces = [force_at(short, structure, x) for structure, x in placed]
-    left = [short.whitened(short.force_N - f) if np.isfinite(f).all() else np.array([np.inf]) for f in forces]
-    return np.array([float(np.sum(e * e)) for e in left])
 
 
 def _thinned(every: list[dict[str, float]]) -> list[dict[str, float]]:

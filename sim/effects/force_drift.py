@@ -12,8 +12,8 @@ first sample in all forms.
 - `bent`: rate · t until a time, and a share of that rate from there on, as where a door is opened or a heater goes off.
 - `two_bodies`: a share of it settles within τ, the rest within `later` times as long: gauge and body of a cell.
 - `quickening`: rate · t (1 + t/2τ), as a supply that ends: twice as quick at τ.
-- `wandering`: rate · (t + Σ c_k (sin(kπ t/T) T/kπ − t)), k from 1 to 12, over the length T of the data, so that the rate
-  swings by half waves: as where a heater goes on and off, or a zero walks. `at_time` is their middle, T/2.
+- `wandering`: rate · (t + Σ c_k (sin(kπ t/T) T/kπ − t)), k from 1 to 12, over the length T of the data: the rate itself
+  swings by half waves, as where a heater goes on and off, or a zero walks. `at_time` is their middle, T/2.
 - `rezeroed`: rate · (t mod `every`), as where a device finds its zero anew at even distances (OIML R 76-1,
   Non-automatic weighing instruments: devices that set zero by themselves).
 

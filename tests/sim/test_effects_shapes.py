@@ -157,7 +157,7 @@ def test_hum_with_all_its_harmonics() -> None:
 
 def test_a_delay_that_wanders() -> None:
     stamps = 5.0 + np.linspace(0.0, 40.0, 4001)
-    waves = {f"wave_{k}": 0.0 for k in range(1, 7)} | {"wave_1": -0.2, "wave_4": 0.3}
+    waves = {f"wave_{k}": 0.0 for k in range(1, 13)} | {"wave_1": -0.2, "wave_4": 0.3}
     wanders = effect("force_delay").form("wandering")
     assert wanders.time_shift is not None
     late = stamps - wanders.time_shift({"delay": 0.004, "at_time": 20.0, **waves}, stamps)
