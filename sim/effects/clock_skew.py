@@ -12,7 +12,7 @@ Over the time T since the first force sample the force clock counts T (1 + skew 
 - `set_once`: at a share `set_at` of the data it is set, which undoes a share `undone` of what it has gained by then; it
   runs on as before, and `skew` is its rate before and after (Mills: a clock that is far off is stepped, not slewed).
   The step is spread over a hundredth of the data, so that a fit can find its way to it.
-- `wandering`: the rate is skew · (1 + Σ c_k cos(kπ t/T)), k from 1 to 4, over the length T of the data, twice
+- `wandering`: the rate is skew · (1 + Σ c_k cos(kπ t/T)), k from 1 to 12, over the length T of the data, twice
   `at_time`, so that `skew` is its mean over them: warmth, a loop that seeks its reference, a leap second smeared over a
   while (ITU-T G.810: wander).
 
@@ -70,7 +70,7 @@ def wandering(values: Mapping[str, float], stamp_s: Array) -> Array:
     return np.asarray(stamp_s - 1e-6 * values["skew"] * (since + more))
 
 
-_WAVES = 4
+_WAVES = 12
 _SET_WITHIN = 0.01
 _SET_AT = (0.2, 0.35, 0.5, 0.65, 0.8)
 _SKEW = Parameter(

@@ -186,7 +186,7 @@ def test_a_clock_that_is_set_once() -> None:
 
 def test_a_clock_whose_rate_wanders() -> None:
     stamps = 5.0 + np.linspace(0.0, 40.0, 4001)
-    waves = {f"wave_{k}": 0.0 for k in range(1, 5)} | {"wave_1": -0.5, "wave_3": 0.8}
+    waves = {f"wave_{k}": 0.0 for k in range(1, 13)} | {"wave_1": -0.5, "wave_3": 0.8}
     wanders = effect("clock_skew").form("wandering")
     assert wanders.time_shift is not None
     late = stamps - wanders.time_shift({"skew": 150.0, "at_time": 20.0, **waves}, stamps)
