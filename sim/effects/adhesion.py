@@ -20,6 +20,10 @@
 - `quick`: a neck that bears the more the quicker it is opened: pull_off · ((v_0 + v)/(v_0 + 10 mm/s))^n sin(π/2 ·
   gap/range), v_0 = 0.1 mm/s (D. Maugis, M. Barquins, Fracture mechanics and the adherence of viscoelastic bodies, J.
   Phys. D 11, 1978, 1989–2023). `pull_off` is that at 10 mm/s.
+- `ageing`: bridges of liquid go on condensing in contact: pull_off · (1 + growth · ln((t + dwell)/(1 s + dwell))) after
+  t s of it, and e^(−gap/range) of that on the way out alone, until five times the range (L. Bocquet, E. Charlaix, S.
+  Ciliberto, J. Crassous, Moisture-induced ageing in granular media and the kinetics of capillary condensation, Nature
+  396, 1998, 735–737). `pull_off` is that after 1 s.
 - `smooth`: −pull_off · q e^(1−q) with q = gap/z, the same on the way in and out: nothing at touch, the most at z, then
   down again (X.-P. Xu, A. Needleman, Numerical simulations of fast crack growth in brittle solids, J. Mech. Phys.
   Solids 42, 1994, 1397–1434). z = range/3.146, as q e^(1−q) is 1/e there.
@@ -47,6 +51,7 @@ _FALLEN = 3.1461932206205825  # q e^(1 − q) = 1/e, beyond the crest
 _ROUNDED = 0.05  # of the range, over which `even` ends
 _CREEP_MM_S = 0.1
 """Speed of opening below which `quick` falls no further."""
+_TORN = 5.0  # ranges at which `ageing` is torn
 _NEAR = 0.02
 """Share of the range within which a bond grows: not 0, so that the force has no jump at touch."""
 
@@ -78,6 +83,21 @@ def sticking(dt: float, gap: float, state: State, p: State) -> float:
         return 0.0
     state[0] -= (1.0 - state[0]) * math.expm1(-dt / p[2] * math.exp(-gap / (_NEAR * p[1])))
     return -p[0] * state[0] * (1.0 - (1.0 - p[3]) * gap / p[1])
+
+
+@block
+def ageing(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range, dwell, growth); state: whether there is a bond, for how long it has been in
+    contact."""
+    if gap >= _TORN * p[1]:
+        state[0], state[1] = 0.0, 0.0
+    elif gap <= _NEAR * p[1]:
+        state[1] += state[0] * dt
+        state[0] = 1.0
+    if state[0] == 0.0:
+        return 0.0
+    aged = 1.0 + p[3] * math.log((state[1] + p[2]) / (1.0 + p[2]))
+    return -p[0] * max(aged, 0.0) * math.exp(-max(gap, 0.0) / p[1])
 
 
 @block
@@ -208,6 +228,19 @@ EFFECT = Effect(
             ),
             blocks={"gap": sticking},
             state=(0.0,),
+        ),
+        Form(
+            name="ageing",
+            what="pulls after contact alone, the more the longer that was",
+            parameters=(
+                _PULL_OFF,
+                _RANGE,
+                Parameter("dwell", "s", 1e-3, 100.0, 0.1, "time of contact from which it grows", starts=(0.1,)),
+                Parameter("growth", "1", 0.0, 2.0, 0.2, "how much it grows by, in e times as long", starts=(0.2,)),
+            ),
+            sought=False,
+            blocks={"gap": ageing},
+            state=(0.0, 0.0),
         ),
         Form(
             name="necking",

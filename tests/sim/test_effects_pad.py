@@ -425,6 +425,16 @@ class TestSeparationAndAdhesion:
         assert_allclose(way_out[:990], pull[:990], atol=1e-6)
         assert_allclose(way_in[1500:], way_out[1500:], atol=1e-6)
 
+    @pytest.mark.parametrize("contact_s", [1.0, 20.0])
+    def test_bridges_that_go_on_condensing_pull_by_the_logarithm_of_the_time(self, contact_s: float) -> None:
+        held = round(contact_s * 1e3)
+        x = np.concatenate([[-0.1], np.full(held + 1, 0.5), -np.linspace(0.01, 1.2, 1191)])
+        aged = active("adhesion", "ageing", pull_off=0.3, range=0.2, dwell=0.1, growth=0.25)
+        force = simulate(LINEAR, [aged], np.arange(x.size) * 1e-3, x)
+        gap, pull = -x[held + 2 :], 0.3 * (1 + 0.25 * math.log((contact_s + 0.1) / 1.1))
+        assert force[0] == 0.0
+        assert_allclose(force[held + 2 :], np.where(gap < 1.0, -pull * np.exp(-gap / 0.2), 0.0), rtol=2e-3, atol=1e-12)
+
     @pytest.mark.parametrize("form", ["exponential", "van_der_waals"])
     def test_a_pull_that_ends_nowhere_has_fallen_to_1_e_at_the_range(self, form: str) -> None:
         force = simulate(LINEAR, [active("adhesion", form, pull_off=0.3, range=0.2)], TIME[:2], np.full(2, -0.2))
