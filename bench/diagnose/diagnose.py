@@ -169,11 +169,15 @@ def _needless(
     later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
     if all(later <= HARM * later_square(prepared, fit) for fit in fits[:-1]):
         return None
-    # a drift that turns or ends is one, though its begin does not foretell that
+    # a drift that turns or ends is one, though its begin does not foretell that; nor does half of a course the rest
     causes = fits[-1].structure.causes[own:]
-    drifts = [c.id == "force_drift" and excess[k] - excess[k + 1] > NEARLY_ALL * scale for k, c in enumerate(causes)]
+    untold = [
+        (c.id == "force_drift" and excess[k] - excess[k + 1] > NEARLY_ALL * scale)
+        or (c.has_a_course and excess[k + 1] < MOST * excess[k])
+        for k, c in enumerate(causes)
+    ]
     rest = [
-        np.inf if drifts[k] else later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(last + 1)
+        np.inf if untold[k] else later_square(prepared, without(prepared, fits[-1], own + k)) for k in range(last + 1)
     ]
     for k in range(last + 1):  # what it takes of all that was held out may be more than it does harm to the end alone
         if excess[k + 1] < MOST * excess[k] and squares[k] - squares[k + 1] > (1.0 - SEEN) * (later - rest[k]):

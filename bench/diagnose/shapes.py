@@ -193,7 +193,7 @@ def with_a_course(cause: Cause) -> list[Cause]:
     """A cause that is now more and now less over the data, begun from larger sizes: what comes and goes is little on
     the average, and its half waves, of that size, are much."""
     size = cause.amplitude
-    if size is None or all(p.spread is None for p in cause.fitted):
+    if size is None or not cause.has_a_course:
         return []
     larger = [times * cause.start[size.name] for times in LARGER]
     return [cause.with_start(**{size.name: min(max(value, size.lower), size.upper)}) for value in larger]

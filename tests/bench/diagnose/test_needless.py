@@ -23,12 +23,14 @@ def needless(
     left_out: Sequence[float],
     ids: Sequence[str] = ("friction", "backlash", "inertia"),
     later: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
+    course: bool = False,
 ) -> int | None:
     """Number of the needless cause: `squares`, with none, one … all causes; `left_out`, without each but the last.
-    `later`: squares of what comes later, by the number of causes. The noise's own square is 1."""
+    `later`: squares of what comes later, by the number of causes; `course`: they have one in time. The noise's own
+    square is 1."""
+    causes = tuple(SimpleNamespace(id=i, has_a_course=course) for i in ids)
     fits: list[Any] = [
-        SimpleNamespace(structure=SimpleNamespace(causes=tuple(SimpleNamespace(id=i) for i in ids[:k])), number=k)
-        for k in range(len(squares))
+        SimpleNamespace(structure=SimpleNamespace(causes=causes[:k]), number=k) for k in range(len(squares))
     ]
     monkeypatch.setattr(module, "without", lambda prepared, fit, index: index)
     monkeypatch.setattr(module, "held_out_square", lambda prepared, index: left_out[index])
@@ -62,6 +64,13 @@ def test_one_that_does_harm_later_goes_but_a_drift_may_turn(monkeypatch):
     assert needless(monkeypatch, [400.0, 3.0], [], later=[2.0, 2000.0]) == 0
     assert needless(monkeypatch, [400.0, 3.0], [], ["force_drift"], later=[2.0, 2000.0]) is None
     assert needless(monkeypatch, [4.0, 2.0], [], ["force_drift"], later=[2.0, 9.0]) == 0
+
+
+def test_half_of_a_course_does_not_foretell_the_rest(monkeypatch):
+    """Of a delay that is now more and now less, whose blocks amid the data are met."""
+    for course, gone in ((True, None), (False, 0)):
+        assert needless(monkeypatch, [60.0, 10.0], [], ["force_delay"], [15.0, 300.0], course) == gone
+    assert needless(monkeypatch, [60.0, 40.0], [], ["force_delay"], [15.0, 300.0], True) == 0  # they are not
 
 
 def test_what_it_takes_of_all_counts_against_its_harm_later(monkeypatch):
