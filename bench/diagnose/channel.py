@@ -364,8 +364,7 @@ def _spikes(force: Array, good: Mask) -> Mask:
     quiet = reach <= np.quantile(reach, 0.5)  # in holds the differences are noise alone
     limit = far((y - middle)[quiet])
     if not np.isfinite(limit):  # most of a coarse channel's values are the one between their neighbours
-        heaps = (y - middle)[np.abs(y - middle) <= HEAPS * resolution(force)]
-        limit = max(COARSELY * float(np.sqrt(np.mean(heaps**2))), LEAPS * resolution(force))
+        limit = max(COARSELY * _of_the_heaps(y - middle, resolution(force)), LEAPS * resolution(force))
     limit = max(limit, FAR * noise)
     mask[index[_beyond(off, np.full(len(y), limit), 2.0 * reach)]] = True
     return mask
@@ -452,12 +451,17 @@ def standing_off(residual: Array, good: Mask, suspect: Mask, step_N: float) -> M
     calm = np.quantile(np.abs(around - middle), CALM, axis=0)
     limit = far(e - middle)
     # where a step is as large as the noise, values come in heaps, of which no tail is foretold
-    heaps = (e - middle)[np.abs(e - middle) <= HEAPS * step_N]
-    coarse = max(FAR * float(np.sqrt(np.mean(heaps**2))), NEXT * step_N) if len(heaps) else 0.0
+    coarse = max(FAR * _of_the_heaps(e - middle, step_N), NEXT * step_N)
     limits = np.maximum(np.where(suspect[index], 0.5, 1.0) * limit, coarse)
     reach = 3.0 * np.maximum(calm - float(np.median(calm)), 0.0)
     mask[index[_beyond(np.abs(e - middle), limits, reach)]] = True
     return mask
+
+
+def _of_the_heaps(values: Array, step_N: float) -> float:
+    """RMS of those values (n,) that are noise in a channel of such steps; 0 where none are."""
+    heaps = values[np.abs(values) <= HEAPS * step_N]
+    return float(np.sqrt(np.mean(heaps**2))) if len(heaps) else 0.0
 
 
 def of_the_model(modelled: Array, errors: Array, off: Mask) -> Mask:

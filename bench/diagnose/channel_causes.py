@@ -34,7 +34,7 @@ def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: 
     error = (prepared.raw.force_N - before_N)[at]
     n = max(int(counted.sum()), 1)
     out = []
-    if final.structure.causes and final.structure.causes[-1].id == "mains_hum" and prepared.mains is not None:
+    if final.structure.causes and final.structure.causes[-1].id == "mains_hum":
         hum = prepared.hum_N[at][counted]
         id_, form, numbers = described(final, len(final.structure.causes) - 1)
         out.append(_named(id_, form, numbers, float(np.sum(hum**2)) / n))

@@ -16,14 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from scipy.signal import lfilter
 from scipy.stats import chi2 as chi2_law
 
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 
-from .uneven import share_of_force
+from .uneven import likeliest, share_of_force
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -255,21 +254,11 @@ def _best(
     """(deviance, memory in s, white and coloured power) of the noise that does best with what is beside."""
     out = (np.inf, 0.0, 0.0, 0.0)
     for memory, noise in zip(memories, noises, strict=True):
-        amounts, deviance = _likeliest(np.stack([*noise, *beside], axis=1), found, weight)
+        amounts, deviance = likeliest(np.stack([*noise, *beside], axis=1), found, weight)
         deviance += COLOURED * (len(noise) - 1)
         if deviance < out[0]:
             out = (deviance, memory, float(amounts[0]), float(amounts[1]) if len(noise) > 1 else 0.0)
     return out
-
-
-def _likeliest(columns: Array, found: Array, weight: Array) -> tuple[Array, float]:
-    """(amounts ≥ 0 of columns (k, p) for mean squares `found` (k,) that scatter by √(2/weight), deviance)."""
-    expected, amounts = found, np.zeros(columns.shape[1])
-    for _ in range(6):
-        scale = np.sqrt(weight) / expected
-        amounts = np.asarray(nnls(columns * scale[:, None], found * scale)[0])
-        expected = np.maximum(columns @ amounts, 1e-6 * found)
-    return amounts, float(np.sum(weight * (np.log(expected / found) + found / expected - 1.0)))
 
 
 def _from_motion(y: Array) -> float:

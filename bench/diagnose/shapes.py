@@ -17,7 +17,7 @@ from .modes import NAMED as MISSING
 from .modes import as_believed, missing_told
 from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
-from .refit import Fit, force_at, reduced, refit
+from .refit import Fit, chi2, reduced, refit
 from .ripple import ripples
 
 Array = NDArray[np.float64]
@@ -169,9 +169,8 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
     shape = narrowed(form, Reach.of(short, structure, short.sample_s))
     told = {p.name: values[index][p.name] for p in shape.parameters if p.name in values[index]}
     like = cause_of(cause.effect, shape, told)
-    begun = [like.with_start(**own) for own in [{}, *_own(shape, told), *_thinned(list(combinations(shape)))]]
-    chosen = _best_placed(short, lead, index, begun) + with_a_course(like)
-    tried = [refit(short, *_in_place(lead, index, c, lead.x[:end]), FEW, NEARLY) for c in chosen]
+    begun = _begun(short, lead, index, like, [{}, *_own(shape, told), *_thinned(list(combinations(shape)))])
+    tried = [refit(short, *_in_place(lead, index, c, lead.x[:end]), FEW, NEARLY) for c in begun]
     if not tried:
         return None
     best = min(tried, key=lambda fit: fit.chi2)
@@ -182,31 +181,25 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
 def begun_anew(short: Data, lead: Fit, index: int, like: Cause) -> list[Cause]:
     """Another shape of a cause of a fit, `like` that one in the numbers that they share, with its own begun elsewhere:
     where it fits best so."""
-    told = set(lead.structure.causes[index].start)
-    return [
-        *_best_placed(short, lead, index, [like.with_start(**o) for o in _own(like.form, told)]),
-        *with_a_course(like),
-    ]
+    return _begun(short, lead, index, like, _own(like.form, lead.structure.causes[index].start))
 
 
-def with_a_course(cause: Cause) -> list[Cause]:
+def _begun(short: Data, lead: Fit, index: int, like: Cause, own: Sequence[Mapping[str, float]]) -> list[Cause]:
+    """A cause in a place of a fit with some of its numbers begun as `own` has them, where it fits best as it stands;
+    and begun larger, where it has a course."""
+    causes, pad = [like.with_start(**values) for values in own], lead.x[: len(lead.structure.pad.coordinates)]
+    left = np.array([chi2(short, *_in_place(lead, index, cause, pad)) for cause in causes])
+    best = [causes[k] for k in np.argsort(left, kind="stable")[:TRIED] if np.isfinite(left[k])]
+    return [*best, *_larger(like)]
+
+
+def _larger(cause: Cause) -> list[Cause]:
     """A cause that is now more and now less over the data, begun from larger sizes: what comes and goes is little on
     the average, and its half waves, of that size, are much."""
     size = cause.amplitude
     if size is None or not cause.has_a_course:
         return []
-    larger = [times * cause.start[size.name] for times in LARGER]
-    return [cause.with_start(**{size.name: min(max(value, size.lower), size.upper)}) for value in larger]
-
-
-def _best_placed(short: Data, lead: Fit, index: int, causes: Sequence[Cause]) -> list[Cause]:
-    """The best of some causes in a place of a fit, as they stand there."""
-    pad = lead.x[: len(lead.structure.pad.coordinates)]
-    placed = [_in_place(lead, index, cause, pad) for cause in causes]
-    forces = [force_at(short, structure, x) for structure, x in placed]
-    left = [short.whitened(short.force_N - f) if np.isfinite(f).all() else np.array([np.inf]) for f in forces]
-    chi2 = np.array([float(np.sum(e * e)) for e in left])
-    return [causes[k] for k in np.argsort(chi2, kind="stable")[:TRIED] if np.isfinite(chi2[k])]
+    return [cause.with_start(**{size.name: times * cause.start[size.name]}) for times in LARGER]
 
 
 def _own(form: Form, told: Collection[str]) -> list[dict[str, float]]:

@@ -19,7 +19,6 @@ FEWEST = 5  # holds that tell of it
 APART = 3.0  # squares of second differences that say as much as one of noise whose tails may be heavy
 PAYS = 60.0  # twice the log-likelihood that it must gain over noise that is the same at all forces …
 MOST = 0.7  # … and the share of what holds of one loudness leave of that
-STEPS = 12
 
 
 def share_of_force(errors_N: Sequence[Array], forces_N: Sequence[float]) -> float:
@@ -37,18 +36,18 @@ def share_of_force(errors_N: Sequence[Array], forces_N: Sequence[float]) -> floa
     if not grown.any():
         return 0.0
     scale = float(grown.max())
-    even = _likeliest(np.ones((len(long), 1)), squares, counts)[1]
-    (air, more), uneven = _likeliest(np.stack([np.ones(len(long)), grown / scale], axis=1), squares, counts)
+    even = likeliest(np.ones((len(long), 1)), squares, counts)[1]
+    (air, more), uneven = likeliest(np.stack([np.ones(len(long)), grown / scale], axis=1), squares, counts)
     if even - uneven < max(PAYS, MOST * even) or air <= 0.0:
         return 0.0
     return float(np.sqrt(more / air / scale))
 
 
-def _likeliest(columns: Array, squares: Array, counts: Array) -> tuple[Array, float]:
-    """(amounts ≥ 0 of columns (k, p) for mean squares (k,) of so many values each, deviance)."""
-    expected, amounts = squares, np.zeros(columns.shape[1])
-    for _ in range(STEPS):
-        scale = np.sqrt(counts) / expected
-        amounts = np.asarray(nnls(columns * scale[:, None], squares * scale)[0])
-        expected = np.maximum(columns @ amounts, 1e-3 * squares)
-    return amounts, float(np.sum(counts * (np.log(expected / squares) + squares / expected - 1.0)))
+def likeliest(columns: Array, found: Array, weight: Array) -> tuple[Array, float]:
+    """(amounts ≥ 0 of columns (k, p) for mean squares `found` (k,) that scatter by √(2/weight), deviance)."""
+    expected, amounts = found, np.zeros(columns.shape[1])
+    for _ in range(6):
+        scale = np.sqrt(weight) / expected
+        amounts = np.asarray(nnls(columns * scale[:, None], found * scale)[0])
+        expected = np.maximum(columns @ amounts, 1e-6 * found)
+    return amounts, float(np.sum(weight * (np.log(expected / found) + found / expected - 1.0)))

@@ -218,12 +218,12 @@ def _given_its_course(final: Fit, index: int, name: str) -> float:
     fitted, at = final.structure.causes[index].fitted, final.structure.of_cause(index)
     own = at.start + [p.name for p in fitted].index(name)
     waves = [at.start + k for k, p in enumerate(fitted) if p.spread is not None]
-    told = np.diag(final.covariance()) > 0.0
-    if not waves or not told[own]:
+    covariance = final.covariance()
+    std = np.sqrt(np.diag(covariance))
+    if not waves or std[own] == 0.0:
         return 1.0
-    chosen = [own, *(k for k in waves if told[k])]
-    spread = np.sqrt(np.diag(final.covariance())[chosen])
-    shared = final.covariance()[np.ix_(chosen, chosen)] / np.outer(spread, spread)
+    chosen = [own, *(k for k in waves if std[k] > 0.0)]
+    shared = covariance[np.ix_(chosen, chosen)] / np.outer(std[chosen], std[chosen])
     return float(1.0 / np.sqrt(max(np.linalg.pinv(shared, rcond=1e-9)[0, 0], 1.0)))
 
 

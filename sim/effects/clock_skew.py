@@ -30,7 +30,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from sim.effects.base import Array, Effect, Form, Parameter
-from sim.effects.stamps import AT_TIME, HALF_TIME, half_waves, origin
+from sim.effects.stamps import AT_TIME, HALF_TIME, WAVES, half_waves, origin
 
 
 def skewed(values: Mapping[str, float], stamp_s: Array) -> Array:
@@ -66,11 +66,10 @@ def wandering(values: Mapping[str, float], stamp_s: Array) -> Array:
     """When forces stamped `stamp_s` were felt, s."""
     since = stamp_s - origin(stamp_s)
     slow = 0.5 * math.pi / max(values["at_time"], 1e-9)
-    more = sum(values[f"wave_{k}"] * np.sin(k * slow * since) / (k * slow) for k in range(1, _WAVES + 1))
+    more = sum(values[f"wave_{k}"] * np.sin(k * slow * since) / (k * slow) for k in range(1, WAVES + 1))
     return np.asarray(stamp_s - 1e-6 * values["skew"] * (since + more))
 
 
-_WAVES = 12
 _SET_WITHIN = 0.01
 _SET_AT = (0.2, 0.35, 0.5, 0.65, 0.8)
 _SKEW = Parameter(
@@ -143,7 +142,7 @@ EFFECT = Effect(
             what="now faster and now slower apart",
             parameters=(
                 _SKEW,
-                *half_waves(_WAVES, 0.5, "of the rate over the data, over `skew`"),
+                *half_waves(0.5, "of the rate over the data, over `skew`"),
                 HALF_TIME,
             ),
             time_shift=wandering,

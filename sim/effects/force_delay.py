@@ -18,7 +18,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from sim.effects.base import Array, Effect, Form, Parameter
-from sim.effects.stamps import HALF_TIME, half_waves, origin
+from sim.effects.stamps import HALF_TIME, WAVES, half_waves, origin
 
 
 def late(values: Mapping[str, float], stamp_s: Array) -> Array:
@@ -30,11 +30,10 @@ def wandering(values: Mapping[str, float], stamp_s: Array) -> Array:
     """When forces stamped `stamp_s` were felt, s."""
     since = stamp_s - origin(stamp_s)
     angle = 0.5 * math.pi * since / max(values["at_time"], 1e-9)
-    more = sum(values[f"wave_{k}"] * np.cos(k * angle) for k in range(1, _WAVES + 1))
+    more = sum(values[f"wave_{k}"] * np.cos(k * angle) for k in range(1, WAVES + 1))
     return np.asarray(stamp_s - values["delay"] * np.maximum(1.0 + more, 0.0))
 
 
-_WAVES = 12
 _DELAY = Parameter(
     "delay",
     "s",
@@ -62,7 +61,7 @@ EFFECT = Effect(
             what="now more and now less, as a network's",
             parameters=(
                 _DELAY,
-                *half_waves(_WAVES, 0.25, "over the data, over `delay`"),
+                *half_waves(0.25, "over the data, over `delay`"),
                 HALF_TIME,
             ),
             time_shift=wandering,

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from sim.effects.base import Effect, Form, Parameter
-from sim.effects.stamps import HALF_TIME, half_waves
+from sim.effects.stamps import HALF_TIME, WAVES, half_waves
 from sim.jit import State, block
 
 
@@ -92,9 +92,9 @@ def turning(dt: float, force: float, state: State, p: State) -> float:
 def wandering(dt: float, force: float, state: State, p: State) -> float:
     """Half waves of the rate; p = (rate, wave_1 to wave_12, at_time)."""
     state[0] += dt
-    slow = 0.5 * math.pi / max(p[13], 1e-9)
+    slow = 0.5 * math.pi / max(p[WAVES + 1], 1e-9)
     way = state[0]
-    for k in range(1, 13):
+    for k in range(1, WAVES + 1):
         way += p[k] * (math.sin(k * slow * state[0]) / (k * slow) - state[0])
     return force + p[0] * way
 
@@ -113,7 +113,6 @@ def bent(dt: float, force: float, state: State, p: State) -> float:
     return force + p[0] * (min(state[0], p[2]) + p[1] * max(state[0] - p[2], 0.0))
 
 
-_WAVES = 12
 _RATE = Parameter("rate", "N/s", -1e4, 1e4, 0.002, "rate at the first sample", required=True, amplitude=True)
 
 
@@ -191,7 +190,7 @@ EFFECT = Effect(
         Form(
             name="wandering",
             what="now quicker and now slower, and back",
-            parameters=(_RATE, *half_waves(_WAVES, 1.0, "over the data, of the rate's fall, over `rate`"), HALF_TIME),
+            parameters=(_RATE, *half_waves(1.0, "over the data, of the rate's fall, over `rate`"), HALF_TIME),
             sought=False,
             blocks={"sensor": wandering},
             state=(0.0,),

@@ -10,9 +10,15 @@ from typing import Any
 import numpy as np
 
 from bench.diagnose import Diagnosis, diagnose
+from bench.diagnose.channel import faults, not_of_the_motion
+from bench.diagnose.data import Prepared, prepare
+from bench.diagnose.diagnose import believed_structure
+from bench.diagnose.numbers import cause_of
+from bench.diagnose.refit import Fit, onto, refit
 from bench.diagnose.result import Alternative, CauseFound, Number, Remainder
 from bench.protocol import Protocol
 from bench.recording.types import Measurement
+from sim.effects import effect
 from sim.model import Model
 from tests.truth.cases import Case, draw_case
 from tests.truth.motion import Motion, staircase
@@ -41,6 +47,19 @@ def diagnosed(id: str) -> tuple[Case, Diagnosis]:
     """A case and its diagnosis, made once."""
     c = case(id)
     return c, diagnose(measurement(c), Model.from_dict(c.believed))
+
+
+@functools.cache
+def fitted(id: str, shape: str, form: str, size: float = 1.0, seed: int = 1, **told: Any) -> tuple[Case, Prepared, Fit]:
+    """A hidden effect, and the fit of one form of it, from the true numbers."""
+    c = draw_case(seed, (id,), size, shape, **({"protocol": "rich", "rate_hz": 120.0, "jitter": "none"} | told))
+    m = measurement(c)
+    p = prepare(m, not_of_the_motion(m, faults(m.force_N)).good)
+    structure = believed_structure(Model.from_dict(c.believed), p)
+    cause = cause_of(effect(id), effect(id).form(form), c.truth.parameters[id])
+    joined = structure.with_cause(cause)
+    fit = refit(p.short, joined, joined.x(structure.pad.x()), 60, 1e-9)
+    return c, p, onto(fit, p.full)
 
 
 def motion_of(content: dict[str, Any]) -> Motion:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose.verdict import no_size
-from tests.bench.diagnose.test_shapes import fitted
+from tests.bench.diagnose.small import fitted
 
 module = importlib.import_module("bench.diagnose.diagnose")
 

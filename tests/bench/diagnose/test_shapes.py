@@ -1,7 +1,6 @@
 """Shapes of a family beside the one that leads; data of the independent simulator."""
 
 from dataclasses import replace
-from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,9 +8,6 @@ import numpy as np
 import pytest
 
 from bench.diagnose import candidates, shapes, spread
-from bench.diagnose.channel import faults, not_of_the_motion
-from bench.diagnose.data import Prepared, prepare
-from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.modes import as_believed
 from bench.diagnose.numbers import Coordinate, cause_of
 from bench.diagnose.refit import Fit, onto, refit
@@ -19,23 +15,8 @@ from bench.diagnose.shapes import departed, reshaped
 from bench.diagnose.spread import covariance, of_the_noise
 from bench.diagnose.verdict import told_size
 from sim.effects import effect
-from sim.model import Model
 from sim.relaxation import Relaxation
-from tests.bench.diagnose.small import measurement
-from tests.truth.cases import Case, draw_case
-
-
-@cache
-def fitted(id: str, shape: str, form: str, size: float = 1.0, seed: int = 1, **told: Any) -> tuple[Case, Prepared, Fit]:
-    """A hidden effect, and the fit of one form of it, from the true numbers."""
-    c = draw_case(seed, (id,), size, shape, **({"protocol": "rich", "rate_hz": 120.0, "jitter": "none"} | told))
-    m = measurement(c)
-    p = prepare(m, not_of_the_motion(m, faults(m.force_N)).good)
-    structure = believed_structure(Model.from_dict(c.believed), p)
-    cause = cause_of(effect(id), effect(id).form(form), c.truth.parameters[id])
-    joined = structure.with_cause(cause)
-    fit = refit(p.short, joined, joined.x(structure.pad.x()), 60, 1e-9)
-    return c, p, onto(fit, p.full)
+from tests.bench.diagnose.small import fitted
 
 
 def stated(fit: Fit, name: str) -> tuple[float, float]:
