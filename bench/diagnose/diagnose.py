@@ -36,7 +36,7 @@ from .refit import Fit, extended, force_at, mean_square, onto, placed, refit
 from .remains import remains
 from .result import Alternative, Diagnosis
 from .search import Search
-from .shapes import reshaped
+from .shapes import reshaped, steadier
 from .spread import covariance
 from .swing import Swing
 from .swing import find as swinging
@@ -115,13 +115,17 @@ def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple
     fits = chain(prepared, final, base, path.fits)
     squares, excess = excesses(prepared, fits, floor_N)
     shapes, as_found = (set(shapes_of(fit.structure)) for fit in (final, plain))
-    untried = shapes != as_found
+    # it may be the shape that does harm, and not the cause
+    others: list[Callable[[Fit], Fit]] = [lambda fit: plain] if shapes != as_found else []
+    others.append(lambda fit: steadier(prepared.short, fit, len(base.structure.causes)))
     while len(fits) > 1 and (number := needless(fits, squares, excess)) is not None:
-        if untried:  # it may be the shape that does harm, and not the cause
-            untried, others = False, chain(prepared, ordered(prepared, plain, base), base, path.fits)
-            of_them = excesses(prepared, others, floor_N)
-            if needless(others, *of_them) is None:
-                return others, *of_them
+        while others:
+            other = others.pop(0)(fits[-1])
+            if other is not fits[-1]:
+                again = chain(prepared, ordered(prepared, other, base), base, path.fits)
+                of_them = excesses(prepared, again, floor_N)
+                if needless(again, *of_them) is None:
+                    return again, *of_them
         fits, squares, excess = _dropped(prepared, path, fits, number, floor_N)
     return fits, squares, excess
 

@@ -114,6 +114,19 @@ def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
     return fit if taken is lead else taken
 
 
+def steadier(short: Data, fit: Fit, own: int = 0) -> Fit:
+    """The fit with each cause that has a course in the best of its shapes that have none: half waves go where they may
+    in a block that was not seen. The fit itself where there is no such cause; `own`: causes that stay as they are."""
+    for index in range(own, len(fit.structure.causes)):
+        if fit.structure.causes[index].has_a_course:
+            members = families(short, fit, [index])[0]
+            steady = [m for m in members if not m.fit.structure.causes[index].has_a_course]
+            if steady:
+                best = steady[int(np.argmin(scores(short, steady)))].fit
+                fit = refit(short, best.structure, best.x, END, 1e-8)
+    return fit
+
+
 def _longer(short: Data, fit: Fit, index: int) -> Fit:
     """The fit with a longer period than was sought for a cause that repeats with the position, where its own is at the
     bound or leaves something: while other causes may stand first a long one is another law, and no more."""

@@ -11,7 +11,7 @@ from bench.diagnose import candidates, shapes, spread
 from bench.diagnose.modes import as_believed
 from bench.diagnose.numbers import Coordinate, cause_of
 from bench.diagnose.refit import Fit, onto, refit
-from bench.diagnose.shapes import departed, reshaped
+from bench.diagnose.shapes import departed, reshaped, steadier
 from bench.diagnose.spread import covariance, of_the_noise
 from bench.diagnose.verdict import told_size
 from sim.effects import effect
@@ -243,3 +243,13 @@ def test_a_size_is_as_sure_as_it_is_where_its_course_is_given() -> None:
         spread = alike[:count, :count]
         final: Any = SimpleNamespace(structure=structure, x=np.zeros(count), covariance=lambda spread=spread: spread)
         assert told_size(final, 0) == pytest.approx(sure)
+
+
+def test_a_drift_that_settles_is_known_without_half_waves_of_its_rate():
+    _, prepared, fit = fitted("force_drift", "exponential", "wandering", 1.5)
+    steady = steadier(prepared.short, refit(prepared.short, fit.structure, fit.x, 20, 1e-8))
+    assert [c.id for c in steady.structure.causes] == ["force_drift"]
+    assert not steady.structure.causes[0].has_a_course
+    # a third of the numbers, and what it leaves is noise
+    assert steady.chi2 < 1.1 * (np.count_nonzero(prepared.short.weight > 0) - steady.free)
+    assert steadier(prepared.short, steady) is steady
