@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,13 +13,10 @@ from numpy.typing import NDArray
 from sim import effects
 
 from .candidates import (
-    CHANNEL,
     LONGEST_PERIOD,
     LONGEST_REPORTED,
     Signatures,
-    alike,
     combinations,
-    forms,
     narrowed,
     starts,
     with_periods,
@@ -29,28 +25,28 @@ from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
 from .felt_errors import felt_errors, redrawn
 from .late_by_chance import late_by_chance_s
-from .numbers import Cause, cause_of, shapes_of
+from .numbers import shapes_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
-from .shapes import begun_anew, departed, families
-from .sieve import ALL, BETTER, CLOSE, COMPARED, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_first
+from .shapes import families
+from .shaping import UNCLEAN, Shaping
+from .sieve import ALL, BETTER, COMPARED, MORE
 
 Array = NDArray[np.float64]
 
 MANY_MORE = 2  # numbers of a shape beyond those of the plain one: then two plain causes are asked for in its place
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
-AS_WELL = 0.8  # the same, of a second cause of a kind beside the first
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
-CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
 LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
 A_SHAPE = 0.1  # of what is left beyond the noise, that another shape of a cause takes where no further cause pays
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
+MUCH_LEFT, A_PART = 0.03, 0.05  # of what the belief leaves beyond the noise, that a first cause and all that follow it
+# leave; and what the lesser of two in its place takes
 MOST_CAUSES = 3
 SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
-RIVALS = 2  # beside the best, that are asked for their best shapes
 LONG_WAVES = 3  # starts of a wave that is longer than those sought
 LATER_BY_CHANCE = 1.3  # times what was known of it
 MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
@@ -72,7 +68,7 @@ class _Turn:
     """What is missed is of the shape of a cause that was found, and no form has it."""
 
 
-class Search(Sieve):
+class Search(Shaping):
     """One search on one measurement."""
 
     @cached_property
@@ -110,10 +106,18 @@ class Search(Sieve):
         return [self.believed.x(pad, values) for pad in pads for values in told]
 
     def path(self, base: Fit) -> Path:
-        """Causes one after the other while each pays; then those that others have made needless go."""
-        path = Path([base])
+        """Causes one after the other while each pays; then those that others have made needless go. Where the first
+        leaves much whatever follows, the same from one that stood near it."""
+        begun = time.process_time()
+        path = self._walked(Path([base]), begun)
+        path = self._from_another_first(path, begun) or path
+        self._compare(path)
+        return path
+
+    def _walked(self, path: Path, begun: float) -> Path:
+        """A path carried on, cause by cause, until none pays or there is no time. `begun`: of processor, s."""
         asked = 1  # fits on the path when the causes' shapes were last asked
-        begun = turned_at = time.process_time()
+        turned_at = time.process_time()
         while len(path.fits) <= MOST_CAUSES:
             now = time.process_time()
             # a third cause is not begun where it would not be done in time: most often there is none
@@ -136,8 +140,31 @@ class Search(Sieve):
             self._note(path, turn)
             if turn.of_a_shape or not self._added(path, turn):
                 break
-        self._compare(path)
         return path
+
+    def _from_another_first(self, path: Path, begun: float) -> Path | None:
+        """The path to two causes from one that stood near the first, where the first leaves much and those two leave
+        nothing: of two that look like a third together, that one comes first. None: there is none."""
+        if len(path.fits) < 2:
+            return None
+        base, end, prepared = path.fits[0], path.fits[-1], self.prepared
+        left = end.chi2 - self.expected
+        if left < MUCH_LEFT * (base.chi2 - self.expected) or unexplained(end.chi2, self.expected) <= 0.0:
+            return None
+        for near in self._near(base, path.rivals[0]):
+            if time.process_time() - begun >= LONGEST_S:
+                break
+            first = self._carried(near, ALL)
+            stood = [first, *(t for t in path.rivals[0] if t.id != near.id)]
+            found = self.judge(base, first.fit, base)
+            again = Path([base, first.fit], [stood], path.tried[:1], path.measures[:1], [found])
+            again = self._walked(again, begun)
+            two = len(again.fits) == 3 and again.evidence[1].share > A_PART
+            beyond = again.fits[-1].chi2 - self.expected
+            if two and self._clean(again.fits[0].chi2, again.fits[-1].chi2) and beyond < UNCLEAN * left:
+                return again
+            self.prepared = prepared  # which the path that was left may have whitened
+        return None
 
     def _turn(self, path: Path) -> _Turn | None:
         """What stands to be added to a path, and what it is worth; None: nothing does."""
@@ -272,28 +299,6 @@ class Search(Sieve):
             return ranked
         return sorted([again, *ranked[1:]], key=lambda t: t.score)
 
-    def _in_shape(self, now: Fit, ranked: list[Trial], first: bool, anyway: bool) -> list[Trial]:
-        """The best and those near it with the causes in their best shapes, where the best leaves something that tells
-        them apart, or is a law drawn through points, and another comes in front so, or a further cause leaves next to
-        nothing; or `anyway`."""
-        best = ranked[0]
-        near = self._near(now, ranked)
-        # a curve through points is that of any other cause but for crumbs
-        told = unexplained(best.fit.chi2, self.expected) > 0.0 or drawn(best)
-        if not anyway and not (near and told):
-            return ranked
-        with ThreadPoolExecutor(WORKERS) as pool:
-            shaped = list(pool.map(self._shaped, [best, *near]))
-        lead = plainer_first(now, sorted(shaped, key=lambda t: t.score))[0]
-        if lead.score > shaped[0].score - LATER * self.prepared.memory:
-            lead = shaped[0]
-        clean = lead.fit.chi2 - self.expected < CLEAN * max(now.chi2 - self.expected, 0.0)
-        if lead.id == best.id and not (anyway or (clean and not first)):
-            return ranked
-        asked = {t.id for t in shaped}
-        rest = [*(t for t in shaped if t is not lead), *(t for t in ranked if t.id not in asked)]
-        return [lead, *sorted(rest, key=lambda t: t.score)]
-
     def _two_instead(self, path: Path, plain: Trial, shaped: Trial) -> bool:
         """Whether a first cause in a shape of many numbers does what two plain ones do better, with fewer."""
         if shaped.fit.free < plain.fit.free + MANY_MORE:
@@ -318,15 +323,6 @@ class Search(Sieve):
         if plain is None or not self._two_instead(path, plain, self._told(lead)):
             return ranked
         return [plain, *(t for t in ranked if t is not plain)]
-
-    def _shaped(self, trial: Trial) -> Trial:
-        """A trial with that one of its causes in another form of which it gains most; its own cause stays the last."""
-        again = self._trial(last(self.recurved(trial.fit), trial.id))
-        return again if again.score < trial.score and believable(again.fit, self.prepared) else trial
-
-    def _told(self, trial: Trial) -> Trial:
-        """A trial in its best shapes, where it leaves something that tells of them."""
-        return self._shaped(trial) if unexplained(trial.fit.chi2, self.expected) > 0.0 else trial
 
     def _whitened(self, path: Path) -> None:
         """Once little is left beside the noise, its colour goes into the cost."""
@@ -356,84 +352,6 @@ class Search(Sieve):
             return
         self.prepared = self.prepared.doubting(felt)
         path.fits = [refit(self.short, f.structure, f.x, 20, 1e-8) for f in path.fits]
-
-    def _reshaped(self, before: float, after: float, reshaped: float) -> bool:
-        """Whether another shape of a cause found does what a further cause did. All are χ²."""
-        return before - reshaped > AS_WELL * (before - after) and not self._alone_clean(before, after, reshaped)
-
-    def _united(self, now: Fit, beside: Trial) -> Fit:
-        """The fit with one cause in place of two of a kind, itself and another shape of it: a shape that has what both
-        have, from their numbers; the fit itself where there is none."""
-        own = len(self.believed.causes)
-        index = next((k for k, c in enumerate(now.structure.causes) if k >= own and c.id == beside.id), None)
-        if index is None:  # what is believed stays as it is
-            return now
-        both = beside.fit.structure.values(beside.fit.x)
-        one, other = both[index], both[-1]
-        told_by_other = {p.name for p in beside.cause.fitted}
-        structure, x = reduced(beside.fit, len(both) - 1)
-        structure, x = reduced(replace(beside.fit, structure=structure, x=x), index)
-        without = replace(beside.fit, structure=structure, x=x)
-        best = now
-        for form in beside.cause.effect.forms:
-            cause = cause_of(beside.cause.effect, form)
-            amplitude = cause.amplitude
-            names = {p.name for p in cause.fitted}
-            if amplitude is None or amplitude.name not in one.keys() & other.keys() or not names > told_by_other:
-                continue
-            for values in ({**other, **one}, {**one, **other}):
-                told = {name: value for name, value in values.items() if name in names}
-                told[amplitude.name] = one[amplitude.name] + other[amplitude.name]
-                trial = self._joined(without, cause.with_start(**told), ALL, None)
-                if trial is not None and trial.fit.chi2 < best.chi2 and believable(trial.fit, self.prepared):
-                    best = trial.fit
-        return best
-
-    def _alone_clean(self, before: float, after: float, reshaped: float) -> bool:
-        """Whether a further cause leaves nothing, and another shape of a cause found something beyond chance."""
-        left = max(before - self.expected, 1e-9)
-        return self._clean(before, after) and reshaped - after > max(UNCLEAN * left, RIVAL * self.prepared.memory)
-
-    def _clean(self, before: float, after: float) -> bool:
-        """Whether a fit leaves nothing of what was left before. Both are χ²."""
-        return after - self.expected < max(CLEAN * (before - self.expected), float(np.sqrt(2.0 * self.expected)))
-
-    def recurved(self, now: Fit) -> Fit:
-        """The fit with one of its causes in another form, also of those that only refine others; if that is better."""
-        begun: list[tuple[Fit, Cause]] = []
-        for index, cause in enumerate(now.structure.causes):
-            if index < len(self.believed.causes) or cause.id in CHANNEL:
-                continue
-            structure, x = reduced(now, index)
-            here, without = replace(now, structure=structure, x=x), self._without(now, index)
-            signatures, numbers = Signatures(self.short, without), now.structure.values(now.x)[index]
-            for effect, form in forms(structure, structure.in_air, self.reach, also_unsought=True):
-                if effect.id != cause.id or form.name == cause.form.name:
-                    continue
-                like = alike(now, index, cause_of(effect, form))
-                begun += [(here, c) for c in (like, *begun_anew(self.short, now, index, like))]
-                begun += [(without, s.cause) for s in starts(signatures, effect, form, near=numbers)]
-        with ThreadPoolExecutor(WORKERS) as pool:
-            first = [
-                t for t in pool.map(lambda start: self._joined(start[0], start[1], FEW, None), begun) if t is not None
-            ]
-            # each form on from its best start: one with a long way to go is behind after a few steps
-            best = {(t.id, t.cause.form.name): t for t in sorted(first, key=lambda t: -t.score)}
-            tried = list(pool.map(lambda t: self._carried(t, MORE), best.values()))
-        near = [t for t in tried if not departed(t.fit, len(t.fit.structure.causes) - 1)]
-        fits = [self._carried(t, ALL).fit for t in sorted(near, key=lambda t: t.score)[:2]]
-        others = [fit for fit in fits if not departed(fit, len(fit.structure.causes) - 1)]
-        return min([now, *others], key=lambda fit: fit.chi2)
-
-    def _without(self, fit: Fit, index: int) -> Fit:
-        """The fit without one of its causes, a few steps on."""
-        structure, x = reduced(fit, index)
-        return refit(self.short, structure, x, 10, 1e-5)
-
-    def _near(self, before: Fit, ranked: Sequence[Trial]) -> list[Trial]:
-        """Those that stood close behind the first of a stage."""
-        gain = before.chi2 - ranked[0].fit.chi2
-        return [t for t in ranked[1 : 1 + RIVALS] if before.chi2 - t.fit.chi2 > CLOSE * gain]
 
     def settled(self, now: Fit, joined: Fit) -> Fit:
         """The fit before a cause was added, or a better one that the addition has led to: a valley may be long."""

@@ -75,6 +75,9 @@ class Told(Search):
         chi2 = self.shapes.get(trial.fit.chi2, trial.fit.chi2)
         return SimpleNamespace(id=trial.id, fit=fit(chi2, *(c.id for c in trial.fit.structure.causes)), score=chi2)
 
+    def _carried(self, trial: Any, steps: int) -> Any:
+        return trial
+
     def exchanged(self, path: Any) -> Any:
         self.exchanges += 1
         return self.together or path.fits[-1]
@@ -351,3 +354,28 @@ def test_a_name_is_not_surer_than_its_size(std, most):
     inertia = effect("inertia")
     cause = cause_of(inertia, inertia.forms[0])
     assert verdict._of_its_size(cause, {"mass": Number(1.0, "kg", std)}) == pytest.approx(most)
+
+
+@pytest.mark.parametrize(
+    ("lead", "two", "after"),
+    [
+        (300e3, 1050.0, ["permanent_set", "backlash"]),  # of 3 million a tenth is left by what looks like both
+        (300e3, 40e3, ["stress_softening"]),  # those two leave something themselves
+        (50e3, 1050.0, ["stress_softening"]),  # its shape may miss as much
+    ],
+)
+def test_where_the_first_leaves_much_two_others_that_leave_nothing_stand_in_its_place(lead, two, after):
+    ranks: Any = {
+        (): {"stress_softening": lead, "permanent_set": 700e3},
+        ("permanent_set",): {"backlash": two},
+    }
+    assert named(Told(ranks, None)) == after
+
+
+def test_a_second_that_takes_next_to_nothing_makes_no_other_first():
+    ranks: Any = {
+        (): {"stress_softening": 300e3, "permanent_set": 310e3},
+        ("permanent_set",): {"missing_relaxation_mode": 290e3},
+        ("permanent_set", "missing_relaxation_mode"): {"backlash": 1050.0},
+    }
+    assert named(Told(ranks, None)) == ["stress_softening"]
