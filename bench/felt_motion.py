@@ -209,12 +209,15 @@ def _rested(
         halves = abs(float(inside[: n // 2].mean() - inside[n // 2 :].mean())) / (2.0 * noise_mm / np.sqrt(n))
         cuts = [] if coarse else _steps((inside - level) / noise_mm)
         if cuts or halves < LIKELY:
-            ahead, behind = position_mm[b + 1 : b + 1 + SHORTEST], position_mm[max(a - SHORTEST, 0) : a][::-1]
             edges = [a, *(a + EDGE + cut for cut in cuts), b + 1]
             levels = [float(inside[i:j].mean()) for i, j in pairwise([0, *cuts, n])]
-            edges[0] -= _staying((behind - levels[0]) / noise_mm)
-            edges[-1] += _staying((ahead - levels[-1]) / noise_mm)
-            if not (cuts or coarse) and _turns((position_mm[edges[0] : edges[-1]] - level) / noise_mm):
+            # from within the rest: what begins gently is a move before it is quick enough to be seen
+            first, last = a + FEWEST, b + 1 - FEWEST
+            behind, ahead = position_mm[max(a - SHORTEST, 0) : first][::-1], position_mm[last : b + 1 + SHORTEST]
+            edges[0] = first - _staying((behind - levels[0]) / noise_mm)
+            edges[-1] = last + _staying((ahead - levels[-1]) / noise_mm)
+            whole = slice(min(a, edges[0]), max(b + 1, edges[-1]))
+            if not (cuts or coarse) and _turns((position_mm[whole] - level) / noise_mm):
                 continue
             for (first, end), value in zip(pairwise(edges), levels, strict=True):
                 numbered += 1
@@ -243,9 +246,14 @@ def _steps(off: Array) -> list[int]:
 
 
 def _staying(off: Array) -> int:
-    """How many of the samples after a rest belong to it still; `off`: from its level, in standard deviations."""
+    """How many of the samples after a rest belong to it still; `off`: from its level, in standard deviations. A move
+    that begins gently is seen late: it began where the samples up to there are the least a level's."""
     strays = np.maximum(np.abs(off), np.abs(np.cumsum(off)) / np.sqrt(np.arange(1, len(off) + 1))) > LIKELY
-    return max(int(np.argmax(strays)) - EDGE, 0) if strays.any() else len(off)
+    if not strays.any():
+        return len(off)
+    seen = int(np.argmax(strays))
+    since = np.abs(np.cumsum(off[seen::-1])) / np.sqrt(np.arange(1, seen + 2))
+    return max(seen - max(int(np.argmax(since)), EDGE), 0)
 
 
 def _turns(off: Array) -> bool:

@@ -23,6 +23,7 @@ GENTLE = 0.01  # what a doubled acceleration costs, in squares of the slack and 
 SLACK = 1e-3  # of the way: what a trapezoid may miss a sample by
 NEAR = 30  # samples between a move and a rest, whose first and last ones may be told late
 AGREED = 5.0  # standard deviations of χ² within which a move is a profile
+NOISIER = 1.05  # times the noise's square as the rests tell it
 MOSTLY = 0.8  # of the moves that tell: where so many are trapezoids nothing smooths them
 TELLING, SHOWING = 6, 48  # samples of a move that tell how it begins and ends, at the least; and as many as it takes
 APART = 10  # samples of rest between two moves, one of which would else be in the other
@@ -193,9 +194,15 @@ def smoothed_shape(
         chi2 = _fitted(asked.moves, acceleration, smoothing)[2] / noise**2
         return float(np.mean(chi2 <= 1.2 * n + AGREED * np.sqrt(2.0 * n)))
 
+    def beyond(acceleration: float, smoothing: Smoothing) -> float:
+        """Standard deviations by which all of them together leave more than noise: one alone hides much."""
+        n = float(np.sum(asked.moves.count))
+        chi2 = float(np.sum(_fitted(asked.moves, acceleration, smoothing)[2])) / noise**2
+        return (chi2 - NOISIER * n) / float(np.sqrt(2.0 * n))
+
     plain = asked.acceleration(reach)
-    as_they_are = share(plain, PLAIN)
-    if as_they_are >= MOSTLY:
+    as_they_are, off = share(plain, PLAIN), beyond(plain, PLAIN)
+    if as_they_are >= MOSTLY and off <= AGREED:
         return None
 
     def cost(numbers: Array) -> float:
@@ -210,7 +217,8 @@ def smoothed_shape(
     found = min((_searched(cost, start) for start in sorted(begun, key=cost)[:STARTED]), key=lambda r: r[1])
     acceleration, smoothing = float(np.exp(found[0][0])), _smoothing(found[0])
     fewer = found[1] < cost(np.array([np.log(plain), 0.0, 0.0])) * FEWER
-    return (smoothing, acceleration) if fewer and share(acceleration, smoothing) > as_they_are + SOME else None
+    explained = share(acceleration, smoothing) > as_they_are + SOME or beyond(acceleration, smoothing) < off - AGREED
+    return (smoothing, acceleration) if fewer and explained else None
 
 
 def _searched(cost: Callable[[Array], float], start: Array) -> tuple[Array, float]:

@@ -153,3 +153,29 @@ def test_the_turn_of_a_slow_sine_is_no_rest(seed: int) -> None:
     t = np.arange(0.0, 10.0, STEP_S)
     x = np.sin(0.6 * np.pi * t + seed)
     assert not felt(t, x + NOISE_MM * np.random.default_rng(seed).standard_normal(t.size)).rest.any()
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("planner", ["least jerk", "raised cosine", "trapezoid"])
+def test_quick_moves_of_any_planner_are_off_by_what_is_said(planner: str, seed: int) -> None:
+    """Sixty samples of each: one by itself is like a trapezoid within its noise, seven that miss it alike are not."""
+
+    def gone(s: Array) -> Array:
+        s = np.clip(s, 0.0, 1.0)
+        if planner == "least jerk":
+            return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
+        return np.asarray(s - np.sin(2.0 * np.pi * s) / (2.0 * np.pi))
+
+    t = np.arange(0.0, 8.0, 0.5e-3)
+    begins = 0.6 + np.arange(7)
+    if planner == "trapezoid":
+        x = np.sum([trapezoid(t, b, 0.55, 36.0, 2400.0) for b in begins], axis=0)
+    else:
+        x = np.sum([0.55 * gone((t - b) / 0.030) for b in begins], axis=0)
+    told = felt(t, x + 1.3e-3 * np.random.default_rng(seed).standard_normal(t.size))
+    moving = np.abs(np.gradient(x, t)) > 0.1
+    off, said = told.at(t) - x, np.interp(t, told.time_s, told.std_mm)
+    assert np.sqrt(np.mean(off[moving] ** 2)) < 1.0e-3
+    assert np.mean((off[moving] / said[moving]) ** 2) < 10.0  # what a rest keeps of a gentle start made it hundreds
+    # where it shows what its planner plans, all the samples of a move tell one
+    assert told.planned_at(t[moving]).mean() > 0.9 or planner != "trapezoid"
