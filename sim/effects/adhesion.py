@@ -24,6 +24,9 @@
   t s of it, and e^(−gap/range) of that on the way out alone, until five times the range (L. Bocquet, E. Charlaix, S.
   Ciliberto, J. Crassous, Moisture-induced ageing in granular media and the kinetics of capillary condensation, Nature
   396, 1998, 735–737). `pull_off` is that after 1 s.
+- `preloaded`: pressing makes the contact that sticks: pull_off · (deepest/reach)^n of the depth since the last tear,
+  and e^(−gap/range) of that on the way out alone, until five times the range (F. P. Bowden, D. Tabor, The Friction and
+  Lubrication of Solids, Oxford University Press, 1950, chapter 15: the pull goes with the load that pressed).
 - `smooth`: −pull_off · q e^(1−q) with q = gap/z, the same on the way in and out: nothing at touch, the most at z, then
   down again (X.-P. Xu, A. Needleman, Numerical simulations of fast crack growth in brittle solids, J. Mech. Phys.
   Solids 42, 1994, 1397–1434). z = range/3.146, as q e^(1−q) is 1/e there.
@@ -51,7 +54,7 @@ _FALLEN = 3.1461932206205825  # q e^(1 − q) = 1/e, beyond the crest
 _ROUNDED = 0.05  # of the range, over which `even` ends
 _CREEP_MM_S = 0.1
 """Speed of opening below which `quick` falls no further."""
-_TORN = 5.0  # ranges at which `ageing` is torn
+_TORN = 5.0  # ranges at which `ageing` and `preloaded` are torn
 _NEAR = 0.02
 """Share of the range within which a bond grows: not 0, so that the force has no jump at touch."""
 
@@ -98,6 +101,25 @@ def ageing(dt: float, gap: float, state: State, p: State) -> float:
         return 0.0
     aged = 1.0 + p[3] * math.log((state[1] + p[2]) / (1.0 + p[2]))
     return -p[0] * max(aged, 0.0) * math.exp(-max(gap, 0.0) / p[1])
+
+
+@block
+def pressed(dt: float, depth: float, state: State, p: State) -> float:
+    """No force of its own; state: whether there is a bond, the deepest since it was torn."""
+    state[1] = max(state[1], depth)
+    return 0.0
+
+
+@block
+def preloaded(dt: float, gap: float, state: State, p: State) -> float:
+    """Force in N; p = (pull_off, range, power, reach); state: as of `pressed`."""
+    if gap >= _TORN * p[1]:
+        state[0], state[1] = 0.0, 0.0
+    elif gap <= 0.0:
+        state[0] = 1.0
+    if state[0] == 0.0:
+        return 0.0
+    return float(-p[0] * (max(state[1], 0.0) / p[3]) ** p[2] * math.exp(-gap / p[1]))
 
 
 @block
@@ -240,6 +262,19 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"gap": ageing},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="preloaded",
+            what="pulls after contact alone, the more the deeper that was",
+            parameters=(
+                _PULL_OFF,
+                _RANGE,
+                Parameter("power", "1", 0.05, 3.0, 0.6, "of the depth pressed", starts=(0.5, 1.0)),
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth after which it pulls by `pull_off`", fixed=True),
+            ),
+            sought=False,
+            blocks={"contact": pressed, "gap": preloaded},
             state=(0.0, 0.0),
         ),
         Form(

@@ -101,6 +101,16 @@ class TestSeparationAndAdhesion:
         assert force[0] == 0.0
         assert_allclose(force[held + 2 :], np.where(gap < 1.0, -pull * np.exp(-gap / 0.2), 0.0), rtol=2e-3, atol=1e-12)
 
+    def test_what_was_pressed_deeper_pulls_more_until_it_is_torn(self) -> None:
+        """Presses of 0.8, 0.2 and 0.8 mm: each pulls by its own depth, and nothing pulls on the way in."""
+        out = np.linspace(0.0, 1.2, 1201)
+        x = np.concatenate([np.concatenate([[-1.2], np.linspace(0.0, d, 201), -out]) for d in (0.8, 0.2, 0.8)])
+        stuck = active("adhesion", "preloaded", pull_off=0.3, range=0.2, power=0.5, reach=0.8)
+        force = simulate(LINEAR, [stuck], np.arange(x.size) * 1e-3, x).reshape(3, -1)
+        assert_allclose(force[:, 0], 0.0, atol=1e-12)
+        for pull, left in zip((0.3, 0.15, 0.3), force[:, 202:], strict=True):
+            assert_allclose(left, np.where(out < 1.0, -pull * np.exp(-out / 0.2), 0.0), rtol=1e-9, atol=1e-12)
+
     @pytest.mark.parametrize("form", ["exponential", "van_der_waals"])
     def test_a_pull_that_ends_nowhere_has_fallen_to_1_e_at_the_range(self, form: str) -> None:
         force = simulate(
