@@ -23,6 +23,9 @@ since the last reversal, rises with it, and is a continuous function of position
 - `uneven`: Prandtl's element whose slider holds another force at each place, as between rails that are not parallel:
   F_c (1 + two terms of a Fourier series over `reach`), so that F_c is the mean over the depths (B. Armstrong-Hélouvry,
   Control of Machines with Friction, Kluwer, 1991: friction depends on the position).
+- `tight`: Prandtl's element whose slider holds F_c (1 + more · e^(−((y − place)/width)²)): a rail that is dented or
+  dirty at one place, as rails mostly are where they are used least (B. Armstrong-Hélouvry, the same). F_c is that far
+  from there.
 - `logarithmic`: Prandtl's element whose slider holds F_c (1 + growth ln((v_0 + |v|)/(v_0 + 1 mm/s))), v_0 = 0.1 mm/s:
   polymers creep over what they slide on, and so bear more the quicker they go (B. J. Briscoe, D. Tabor, Friction and
   wear of polymers: the role of mechanical properties, Br. Polym. J. 10, 1978, 74–78). F_c is that at 1 mm/s.
@@ -169,6 +172,20 @@ def uneven(dt: float, y: float, state: State, p: State) -> float:
     more = p[1] * math.sin(angle) + p[2] * math.cos(angle) + p[3] * math.sin(2.0 * angle) + p[4] * math.cos(2.0 * angle)
     limit = p[0] * max(1.0 + more, 0.0)
     force = state[_FORCE] + moved * (p[0] / p[6])
+    force = max(-limit, min(limit, force))
+    state[_FORCE] = force
+    return force
+
+
+@block
+def tight(dt: float, y: float, state: State, p: State) -> float:
+    """Prandtl's element over a rail with a tight place; p = (coulomb, more, place, width, presliding)."""
+    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
+    state[_STARTED] = 1.0
+    state[_LAST] = y
+    away = (y - p[2]) / p[3]
+    limit = p[0] * (1.0 + p[1] * math.exp(-away * away))
+    force = state[_FORCE] + moved * (p[0] / p[4])
     force = max(-limit, min(limit, force))
     state[_FORCE] = force
     return force
@@ -401,6 +418,20 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": uneven},
+            state=(0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="tight",
+            what="more, or less, at one place of the way",
+            parameters=(
+                _COULOMB,
+                Parameter("more", "1", -0.95, 10.0, 0.5, "what the place adds, over `coulomb`", starts=(0.5,)),
+                Parameter("place", "mm", 0.0, 50.0, 1.0, "where that is", bend=True),
+                Parameter("width", "mm", 0.02, 10.0, 0.3, "how far from it 1/e of that is left", starts=(0.2, 0.6)),
+                _PRESLIDING,
+            ),
+            sought=False,
+            blocks={"probe": tight},
             state=(0.0, 0.0, 0.0),
         ),
         Form(

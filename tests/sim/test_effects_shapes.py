@@ -97,6 +97,17 @@ def test_friction_that_swells_along_the_way() -> None:
     assert_allclose(back[10:], -level[::-1][10:], rtol=2e-3)
 
 
+@pytest.mark.parametrize("more", [0.6, -0.4])
+def test_friction_over_a_tight_place(more: float) -> None:
+    numbers = {"coulomb": 0.5, "more": more, "place": 0.8, "width": 0.2, "presliding": 1e-4}
+    x = np.linspace(0.0, 2.0, 4001)
+    level = 0.5 * (1 + more * np.exp(-(((x - 0.8) / 0.2) ** 2)))
+    for way, sign in ((slice(None), 1.0), (slice(None, None, -1), -1.0)):
+        force = simulate(AIR, [active("friction", "tight", **numbers)], np.arange(x.size, dtype=float), x[way])
+        assert_allclose(force[10:], sign * level[way][10:], rtol=2e-3)
+    assert_allclose(level[[0, -1]], 0.5, rtol=1e-6)
+
+
 def test_a_line_lags_as_its_hyperbolic_cosine() -> None:
     tau, slow = 0.02, 2.0 * 0.02 * 4.0 / math.pi**2
     t = np.linspace(0.0, 0.4, 4001)

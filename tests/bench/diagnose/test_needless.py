@@ -98,9 +98,17 @@ def test_a_cause_of_which_nothing_is_left_with_the_hum_beside_it_goes(after, gon
     assert module._faded([fit(), fit(-4e-4, 0.05, 8.0)], fit(*after, 0.0)) == gone
 
 
-@pytest.mark.parametrize(("also_as_found", "kept"), [(False, ["force_delay/constant"]), (True, [])])
-def test_where_the_shape_does_harm_the_cause_stays_as_it_was_found(monkeypatch, also_as_found, kept):
-    """A cause is in the way in its best shape; it is only dropped where it is so in the shape it was found in too."""
+@pytest.mark.parametrize(
+    ("harmful", "kept"),
+    [
+        ({"force_delay/wandering"}, ["force_delay/constant"]),
+        ({"force_delay/wandering", "force_delay/constant"}, ["force_delay/ageing"]),
+        ({"force_delay/wandering", "force_delay/constant", "force_delay/ageing"}, []),
+    ],
+)
+def test_where_the_shape_does_harm_the_cause_stays_in_one_that_does_none(monkeypatch, harmful, kept):
+    """A cause is in the way in its best shape; it is only dropped where it is so too in the shape it was found in, and
+    in the best that has no course in time."""
 
     def fit(*names: str) -> Any:
         pairs = [name.split("/") for name in names]
@@ -108,7 +116,7 @@ def test_where_the_shape_does_harm_the_cause_stays_as_it_was_found(monkeypatch, 
         return SimpleNamespace(structure=SimpleNamespace(causes=causes))
 
     base, plain, final = fit(), fit("force_delay/constant"), fit("force_delay/wandering")
-    harmful = {"force_delay/wandering"} | ({"force_delay/constant"} if also_as_found else set())
+    steady = fit("force_delay/ageing")
 
     def names(fits: list[Any]) -> list[str]:
         return [f"{c.id}/{c.form.name}" for c in fits[-1].structure.causes]
@@ -129,11 +137,13 @@ def test_where_the_shape_does_harm_the_cause_stays_as_it_was_found(monkeypatch, 
     monkeypatch.setattr(module, "_needless", asked_of)
     monkeypatch.setattr(module, "_doubtful", lambda *_: None)
     monkeypatch.setattr(module, "_dropped", lambda prepared, path, fits, number, floor: ([base], [1.0], [1.0]))
+    monkeypatch.setattr(module, "steadier", lambda short, found, own: steady if found is final else found)
     path: Any = SimpleNamespace(fits=[base, plain])
-    prepared: Any = SimpleNamespace()
+    prepared: Any = SimpleNamespace(short=None)
     fits, _, _ = module._needed(prepared, path, final, 1.0)
     assert names(fits) == kept
-    assert asked == [["force_delay/wandering"], ["force_delay/constant"]]
+    in_turn = [["force_delay/wandering"], ["force_delay/constant"], ["force_delay/ageing"]]
+    assert asked == in_turn[: 2 if "force_delay/constant" not in harmful else 3]  # no shape beyond one that does none
 
 
 @pytest.mark.parametrize(
