@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from bench.fitted_moves import Moves
 from bench.identify.motion import jitter
-from bench.motion_between import motion_between, planned_moves
+from bench.motion_between import missed, motion_between, planned_moves
 from bench.profiles import Trapezoid
 from sim.jit import compiled
 
@@ -355,6 +355,7 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
         step, coarse = resolution(position_mm), _coarse(position_mm)
         stretch = np.where(hold > 0, hold, stretch)
         planned = planned_moves(time_s, position_mm, clean, noise, left, hold > 0)
+        worse = float(np.sqrt(max(missed(planned, time_s, position_mm, noise)[0], 1.0)))
         for (first, last), move in planned.items():
             inside = slice(first, last + 1)
             clean[inside] = move.position(time_s[inside])
@@ -363,7 +364,7 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
                 if _by_chance((position_mm[rest] - level) / noise):
                     clean[rest] = level
             at_ends = max(float(std[first]), float(std[last]), 0.7 * coarse)
-            std[inside] = max(2.0 * noise / np.sqrt(last - first + 1), at_ends)
+            std[inside] = max(2.0 * worse * noise / np.sqrt(last - first + 1), at_ends)
             stretch[inside] = 1 + len(clean) + first
         # a window grows until it shows that the motion is no parabola: by then it is off by as much again
         std = np.where(stretch < 0, np.minimum(ASTRAY * std, np.maximum(std, noise)), std)

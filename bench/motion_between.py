@@ -29,7 +29,7 @@ BEND = 1e-4  # of the reach: a bend that a line between nodes may leave out
 WIDEST = 64  # nodes an interval at the most
 LEAST = 3  # samples of a move that can show it to be a trapezoid
 PARTS, SHORTEST = 6, 4  # of a move, whose means show another profile; samples of one
-LOOSE = 1.5  # times the noise, of means over a scale of coarse steps
+LOOSE = 2.5  # times the power of the noise: another profile that is as near as a smoothed motion would be
 FARTHER = 8.0  # times the noise, that a planned move goes at the least
 PAUSE = 2  # intervals that are no rest where the motion hardly slows down
 GAPS = (30, 10, PAUSE)  # samples that noise can make look like a rest amid a slow move
@@ -106,18 +106,22 @@ def planned_moves(
                 )
                 told = _told(found, time_s, position_mm, noise_mm)
                 out |= {k: v for k, v in told.items() if not any(k[0] < o[1] and o[0] < k[1] for o in out)}
-    return _apart(out) if _agree(out, time_s, position_mm, noise_mm) else {}
+    power, parts = missed(out, time_s, position_mm, noise_mm)
+    return _apart(out) if power <= LOOSE + AGREED * np.sqrt(2.0 / parts) else {}
 
 
-def _agree(found: Moves, time_s: Array, position_mm: Array, noise_mm: float) -> bool:
-    """Whether the moves together leave noise alone: what each of them hides in that of its samples shows in the means
-    over its parts, where another profile goes beside it again and again."""
-    chi2, count = 0.0, 0
+def missed(found: Moves, time_s: Array, position_mm: Array, noise_mm: float) -> tuple[float, int]:
+    """(power of what moves leave of the noisy positions, in means over parts of them, over the noise's own; parts).
+
+    What each of them hides in the noise of its samples shows there, where another profile goes beside it again and
+    again.
+    """
+    power, parts = 0.0, 0
     for (first, last), move in found.items():
         off = (position_mm - move.position(time_s))[first : last + 1] / noise_mm
         for part in np.array_split(off, max(min(PARTS, len(off) // SHORTEST), 1)):
-            chi2, count = chi2 + float(np.sum(part)) ** 2 / len(part), count + 1
-    return chi2 <= LOOSE * count + AGREED * float(np.sqrt(2.0 * count))
+            power, parts = power + float(np.sum(part)) ** 2 / len(part), parts + 1
+    return power / max(parts, 1), max(parts, 1)
 
 
 def _onward(position_mm: Array, first: int, last: int) -> tuple[int, int]:
