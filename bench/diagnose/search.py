@@ -30,7 +30,7 @@ from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import families
-from .shaping import UNCLEAN, Shaping
+from .shaping import Shaping
 from .sieve import ALL, BETTER, COMPARED, MORE
 
 Array = NDArray[np.float64]
@@ -44,6 +44,7 @@ HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left b
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MUCH_LEFT, A_PART = 0.03, 0.05  # of what the belief leaves beyond the noise, that a first cause and all that follow it
 # leave; and what the lesser of two in its place takes
+LESS = 0.1  # of what those leave, that two in their place leave
 MOST_CAUSES = 3
 SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
@@ -161,7 +162,7 @@ class Search(Shaping):
             again = self._walked(again, begun)
             two = len(again.fits) == 3 and again.evidence[1].share > A_PART
             beyond = again.fits[-1].chi2 - self.expected
-            if two and self._clean(again.fits[0].chi2, again.fits[-1].chi2) and beyond < UNCLEAN * left:
+            if two and self._clean(again.fits[0].chi2, again.fits[-1].chi2) and beyond < LESS * left:
                 return again
             self.prepared = prepared  # which the path that was left may have whitened
         return None

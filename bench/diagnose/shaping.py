@@ -17,7 +17,7 @@ from .shapes import begun_anew, departed
 from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_first
 
 AS_WELL = 0.8  # share of a second cause of a kind's gain, that a further cause's beside the first reaches
-CLEAN, UNCLEAN = 0.03, 0.1  # of what was left that a fit leaves: nothing, and something
+CLEAN, UNCLEAN = 0.03, 0.05  # of what was left that a fit leaves: nothing, and something
 RIVALS = 2  # beside the best, that are asked for their best shapes
 
 

@@ -140,6 +140,7 @@ class Expecting(Search):
     ("after", "reshaped", "alone"),
     [
         (1010.0, 1090.0, True),  # both leave nothing that speaks, and one fits better by far more than chance
+        (1010.0, 1036.0, True),
         (1010.0, 1020.0, False),
         (1200.0, 1260.0, False),  # what leaves something may be of the shape
         (1010.0, 990.0, False),
