@@ -201,6 +201,8 @@ def forms(structure: Structure, in_air: bool, reach: Reach, also_unsought: bool 
                 continue
             if (in_air and not _in_air(form)) or _repeats_beyond(form, reach):
                 continue
+            if form.has_a_course and not reach.rich:  # where depths are met once, any error is one of its time
+                continue
             if not (form.sought or also_unsought) or (form.amend is not None and not _amends(structure, form)):
                 continue
             out.append((effect, narrowed(form, reach)))

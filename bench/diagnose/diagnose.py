@@ -177,7 +177,7 @@ def _needless(
     causes = fits[-1].structure.causes[own:]
     untold = [
         (c.id == "force_drift" and excess[k] - excess[k + 1] > NEARLY_ALL * scale)
-        or (c.has_a_course and excess[k + 1] < MOST * excess[k])
+        or (c.form.has_a_course and excess[k + 1] < MOST * excess[k])
         for k, c in enumerate(causes)
     ]
     rest = [

@@ -145,11 +145,6 @@ class Cause:
         """Whether it is another pad, as another law is: no number switches it off, it is one at any of them."""
         return self.form.amend is not None and self.amplitude is None
 
-    @property
-    def has_a_course(self) -> bool:
-        """Whether it is now more and now less in time, by half waves over the data."""
-        return any(p.spread is not None for p in self.fitted)
-
     def with_start(self, **values: float) -> Cause:
         """Other values to start from."""
         return replace(self, start={**self.start, **values})

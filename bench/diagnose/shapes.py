@@ -19,6 +19,7 @@ from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, chi2, reduced, refit
 from .ripple import ripples
+from .way import is_rich
 
 Array = NDArray[np.float64]
 
@@ -65,10 +66,12 @@ def stand_in(short: Data, fit: Fit) -> tuple[Fit, list[int]]:
 
 def families(short: Data, lead: Fit, indices: Sequence[int]) -> list[list[Member]]:
     """Of each of some causes, the shape that leads and those others of its family that make a plant."""
+    comes_back = lead.structure.in_air or is_rich(short)
     tried = [
         (index, form)
         for index in indices
         for form in lead.structure.causes[index].effect.forms
+        if (comes_back or not form.has_a_course)
         if form.name != lead.structure.causes[index].form.name and _comparable(lead.structure.causes[index].form, form)
     ]
     with ThreadPoolExecutor(WORKERS) as pool:
@@ -118,9 +121,9 @@ def steadier(short: Data, fit: Fit, own: int = 0) -> Fit:
     """The fit with each cause that has a course in the best of its shapes that have none: half waves go where they may
     in a block that was not seen. The fit itself where there is no such cause; `own`: causes that stay as they are."""
     for index in range(own, len(fit.structure.causes)):
-        if fit.structure.causes[index].has_a_course:
+        if fit.structure.causes[index].form.has_a_course:
             members = families(short, fit, [index])[0]
-            steady = [m for m in members if not m.fit.structure.causes[index].has_a_course]
+            steady = [m for m in members if not m.fit.structure.causes[index].form.has_a_course]
             if steady:
                 best = steady[int(np.argmin(scores(short, steady)))].fit
                 fit = refit(short, best.structure, best.x, END, 1e-8)
@@ -210,7 +213,7 @@ def _larger(cause: Cause) -> list[Cause]:
     """A cause that is now more and now less over the data, begun from larger sizes: what comes and goes is little on
     the average, and its half waves, of that size, are much."""
     size = cause.amplitude
-    if size is None or not cause.has_a_course:
+    if size is None or not cause.form.has_a_course:
         return []
     return [cause.with_start(**{size.name: times * cause.start[size.name]}) for times in LARGER]
 

@@ -113,6 +113,11 @@ class Form:
         if unknown:
             raise ValueError(f"form {self.name}: no place {', '.join(sorted(unknown))}")
 
+    @property
+    def has_a_course(self) -> bool:
+        """Whether it is now more and now less in time, by half waves over the data."""
+        return any(p.spread is not None for p in self.parameters)
+
     def vector(self, values: Mapping[str, float]) -> tuple[float, ...]:
         """The parameter vector the blocks read."""
         if self.pack is not None:
@@ -135,8 +140,9 @@ class Effect:
     reference: str = ""
     """Where the physics stands in the literature."""
     of_motion: bool = True
-    """Whether it acts with depth or speed. One press and one hold show that once, and a pad that is stranger than its
-    law does the same; what runs in time or stands at a level is told by them as well as by a longer run."""
+    """Whether it acts with depth or speed, or as a pad's relaxation and greatest force may. One press and one hold show
+    that once, and a pad that is stranger than its law does the same; what else runs in time is told by them as well as
+    by a longer run."""
 
     def explanation(self, values: Mapping[str, float]) -> str:
         """`says` with numbers in it; `what` where the effect has no such sentence."""

@@ -126,7 +126,6 @@ EFFECT = Effect(
     says="the force {rate:rises/falls} by {rate:milli} mN per second at the start",
     check="let the cell warm up, and keep some free air before and after the run",
     reference="OIML R 60, Metrological regulation for load cells",
-    of_motion=False,
     forms=(
         Form(name="linear", what="steady", parameters=(_RATE,), blocks={"sensor": linear}, state=(0.0,)),
         Form(

@@ -72,7 +72,6 @@ EFFECT = Effect(
     says="the force channel ends at {limit:.4g} N",
     check="raise the amplifier's range, or take a cell of greater capacity; never press on beyond it",
     reference="Khalil, Nonlinear Systems, 3rd ed., 2002, section 1.2",
-    of_motion=False,
     forms=(
         Form(name="hard", what="on both sides", parameters=(_LIMIT,), blocks={"sampling": hard}),
         Form(name="upper", what="in compression alone", parameters=(_LIMIT,), blocks={"sampling": upper}),

@@ -28,7 +28,7 @@ def needless(
     """Number of the needless cause: `squares`, with none, one … all causes; `left_out`, without each but the last.
     `later`: squares of what comes later, by the number of causes; `course`: they have one in time. The noise's own
     square is 1."""
-    causes = tuple(SimpleNamespace(id=i, has_a_course=course) for i in ids)
+    causes = tuple(SimpleNamespace(id=i, form=SimpleNamespace(has_a_course=course)) for i in ids)
     fits: list[Any] = [
         SimpleNamespace(structure=SimpleNamespace(causes=causes[:k]), number=k) for k in range(len(squares))
     ]

@@ -249,7 +249,7 @@ def test_a_drift_that_settles_is_known_without_half_waves_of_its_rate():
     _, prepared, fit = fitted("force_drift", "exponential", "wandering", 1.5)
     steady = steadier(prepared.short, refit(prepared.short, fit.structure, fit.x, 20, 1e-8))
     assert [c.id for c in steady.structure.causes] == ["force_drift"]
-    assert not steady.structure.causes[0].has_a_course
+    assert not steady.structure.causes[0].form.has_a_course
     # a third of the numbers, and what it leaves is noise
     assert steady.chi2 < 1.1 * (np.count_nonzero(prepared.short.weight > 0) - steady.free)
     assert steadier(prepared.short, steady) is steady
