@@ -277,6 +277,22 @@ def test_a_further_cause_that_takes_next_to_nothing_under_an_unsure_name_goes(mo
     assert diagnosis._doubtful(None, fits, excess, 0.0, 1.0, [0.0] * len(excess)) == goes
 
 
+@pytest.mark.parametrize(
+    ("taken", "apart", "sure", "goes"),
+    [
+        (0.05, 4e4, 0.15, 0),  # beside a ceiling that cut off as much: what its edge misses
+        (0.05, 0.0, 0.15, None),  # it is all that there is
+        (0.05, 4e4, 0.4, None),  # the name may be right
+        (0.5, 4e4, 0.15, None),  # it shows beside the noise
+    ],
+)
+def test_beside_faults_of_the_channel_the_first_cause_is_a_further_one(monkeypatch, taken, apart, sure, goes):
+    diagnosis = importlib.import_module("bench.diagnose.diagnose")
+    monkeypatch.setattr(diagnosis, "sureness", lambda path, name, named: ([], sure, sure))
+    fits: list[Any] = [fit(0.0, *("backlash",)[:k]) for k in range(2)]
+    assert diagnosis._doubtful(None, fits, [taken, 0.0], apart, 1.0, [0.0, 0.0]) == goes
+
+
 def test_a_cause_that_came_in_place_of_another_is_held_against_what_stood_beside_it_there():
     """Not against those of an earlier turn, where it was far behind."""
     told = [{"separation": 2000.0, "sensor_lag": 99000.0}, {"force_delay": 1100.0, "sensor_lag": 1101.0}]
