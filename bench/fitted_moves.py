@@ -188,20 +188,16 @@ def smoothed_shape(
         return None
     asked = every.only(telling[np.argsort(-every.moves.speed[telling], kind="stable")[:FASTEST]])
 
-    def share(acceleration: float, smoothing: Smoothing) -> float:
-        """Of the moves, those that are such profiles but for noise."""
+    def told(acceleration: float, smoothing: Smoothing) -> tuple[float, float]:
+        """(share of the moves that are such profiles but for noise; standard deviations by which all of them together
+        leave more than that: one alone hides much)."""
         n = asked.moves.count
         chi2 = _fitted(asked.moves, acceleration, smoothing)[2] / noise**2
-        return float(np.mean(chi2 <= 1.2 * n + AGREED * np.sqrt(2.0 * n)))
-
-    def beyond(acceleration: float, smoothing: Smoothing) -> float:
-        """Standard deviations by which all of them together leave more than noise: one alone hides much."""
-        n = float(np.sum(asked.moves.count))
-        chi2 = float(np.sum(_fitted(asked.moves, acceleration, smoothing)[2])) / noise**2
-        return (chi2 - NOISIER * n) / float(np.sqrt(2.0 * n))
+        beyond = float(np.sum(chi2 - NOISIER * n)) / float(np.sqrt(2.0 * np.sum(n)))
+        return float(np.mean(chi2 <= 1.2 * n + AGREED * np.sqrt(2.0 * n))), beyond
 
     plain = asked.acceleration(reach)
-    as_they_are, off = share(plain, PLAIN), beyond(plain, PLAIN)
+    as_they_are, off = told(plain, PLAIN)
     if as_they_are >= MOSTLY and off <= AGREED:
         return None
 
@@ -217,8 +213,8 @@ def smoothed_shape(
     found = min((_searched(cost, start) for start in sorted(begun, key=cost)[:STARTED]), key=lambda r: r[1])
     acceleration, smoothing = float(np.exp(found[0][0])), _smoothing(found[0])
     fewer = found[1] < cost(np.array([np.log(plain), 0.0, 0.0])) * FEWER
-    explained = share(acceleration, smoothing) > as_they_are + SOME or beyond(acceleration, smoothing) < off - AGREED
-    return (smoothing, acceleration) if fewer and explained else None
+    share, beyond = told(acceleration, smoothing)
+    return (smoothing, acceleration) if fewer and (share > as_they_are + SOME or beyond < off - AGREED) else None
 
 
 def _searched(cost: Callable[[Array], float], start: Array) -> tuple[Array, float]:
