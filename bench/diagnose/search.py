@@ -156,16 +156,25 @@ class Search(Shaping):
             if time.process_time() - begun >= LONGEST_S:
                 break
             first = self._carried(near, ALL)
+            if not self._two_leave_less(first, end):
+                continue
             stood = [first, *(t for t in path.rivals[0] if t.id != near.id)]
             found = self.judge(base, first.fit, base)
             again = Path([base, first.fit], [stood], path.tried[:1], path.measures[:1], [found])
-            again = self._walked(again, begun)
+            again = self._walked(again, time.process_time())  # there is hope, and it has its own time
             two = len(again.fits) == 3 and again.evidence[1].share > A_PART
             beyond = again.fits[-1].chi2 - self.expected
             if two and self._clean(again.fits[0].chi2, again.fits[-1].chi2) and beyond < LESS * left:
                 return again
             self.prepared = prepared  # which the path that was left may have whitened
         return None
+
+    def _two_leave_less(self, first: Trial, end: Fit) -> bool:
+        """Whether a first cause and another, in the shapes that come first, leave less than a path's end."""
+        least = first.fit.chi2 - end.chi2
+        beside = self.ranked(first.fit, least=least)
+        second = next((t for t in beside if t.id != first.id and believable(t.fit, self.prepared)), None)
+        return second is not None and second.fit.chi2 < end.chi2
 
     def _turn(self, path: Path) -> _Turn | None:
         """What stands to be added to a path, and what it is worth; None: nothing does."""
