@@ -31,6 +31,7 @@ NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
 AS_GOOD = 4.0  # Δχ² by which one that is near to what was believed may be worse
 LEFT = 1.03  # times the noise power: what leaves more may have a period beyond those sought
+IN_STEP = 0.3  # of the position's power, that is at a frequency: then the motion swings with it
 EDGE = 1e-6  # within which a coordinate is at its bound
 WORKERS = 2
 
@@ -110,7 +111,7 @@ def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
             if best == 0:
                 break
             other = refit(short, members[best].fit.structure, members[best].fit.x, END, 1e-8)
-            if not departed(other, index):
+            if not departed(short, other, index):
                 taken = other
                 break
         taken = _longer(short, taken, index)
@@ -164,13 +165,27 @@ def _in_place(fit: Fit, index: int, cause: Cause, pad: Array) -> tuple[Structure
     return structure, structure.x(pad, [*values[:index], cause.start, *values[index + 1 :]], fit.of_run)
 
 
-def departed(fit: Fit, index: int) -> bool:
-    """Whether a cause differs from the first of its family by as much as the family allows (a number of either sign,
-    0 by default, at its bound): then it is another cause's shape, of which this one makes what it can."""
+def departed(short: Data, fit: Fit, index: int) -> bool:
+    """Whether a cause is another's shape, of which this one makes what it can: it differs from the first of its family
+    by as much as the family allows (a number of either sign, 0 by default, at its bound), or swings in time as the
+    motion does, so that friction is in it."""
     at = fit.structure.of_cause(index)
     departures = [p.default == 0.0 and p.lower == -p.upper for p in fit.structure.causes[index].fitted]
     x, lower, upper = fit.x[at], fit.structure.lower[at], fit.structure.upper[at]
-    return bool(np.any(np.array(departures, dtype=bool) & ((x <= lower + EDGE) | (x >= upper - EDGE))))
+    at_bound = np.any(np.array(departures, dtype=bool) & ((x <= lower + EDGE) | (x >= upper - EDGE)))
+    return bool(at_bound) or _in_step(short, fit, index)
+
+
+def _in_step(short: Data, fit: Fit, index: int) -> bool:
+    """Whether the position swings with a cause's period in time."""
+    cause = fit.structure.causes[index]
+    if not any(p.name == "period" and p.unit == "s" for p in cause.form.parameters):
+        return False
+    turns = short.time_s / fit.structure.values(fit.x)[index]["period"]
+    lasts = np.gradient(short.time_s)
+    off = short.position_mm - float(np.average(short.position_mm, weights=lasts))
+    at_that = abs(np.average(off * np.exp(-2j * np.pi * turns), weights=lasts))
+    return bool(2.0 * at_that**2 > IN_STEP * np.average(off**2, weights=lasts))
 
 
 def _comparable(one: Form, other: Form) -> bool:
@@ -191,7 +206,7 @@ def _other(short: Data, lead: Fit, index: int, form: Form) -> Member | None:
         return None
     best = min(tried, key=lambda fit: fit.chi2)
     member = Member(refit(short, best.structure, best.x, STEPS, NEARLY), index)
-    return None if departed(member.fit, index) else member
+    return None if departed(short, member.fit, index) else member
 
 
 def begun_anew(short: Data, lead: Fit, index: int, like: Cause) -> list[Cause]:

@@ -46,9 +46,9 @@ class Shaping(Sieve):
             # each form on from its best start: one with a long way to go is behind after a few steps
             best = {(t.id, t.cause.form.name): t for t in sorted(first, key=lambda t: -t.score)}
             tried = list(pool.map(lambda t: self._carried(t, MORE), best.values()))
-        near = [t for t in tried if not departed(t.fit, len(t.fit.structure.causes) - 1)]
+        near = [t for t in tried if not departed(self.short, t.fit, len(t.fit.structure.causes) - 1)]
         fits = [self._carried(t, ALL).fit for t in sorted(near, key=lambda t: t.score)[:2]]
-        others = [fit for fit in fits if not departed(fit, len(fit.structure.causes) - 1)]
+        others = [fit for fit in fits if not departed(self.short, fit, len(fit.structure.causes) - 1)]
         return min([now, *others], key=lambda fit: fit.chi2)
 
     def _without(self, fit: Fit, index: int) -> Fit:

@@ -143,18 +143,31 @@ def test_numbers_of_a_shape_that_is_none_of_the_familys_are_as_sure_as_is_stated
 
 def test_a_shape_as_far_from_its_family_as_can_be_is_another_causes() -> None:
     """A bias of which this much goes with the position is a spring; one of which nothing does is a bias."""
-    _, _, fit = fitted("force_bias", "constant", "along")
+    _, p, fit = fitted("force_bias", "constant", "along")
     share = fit.structure.of_cause(0).start + 1
     for value, far in ((0.0, False), (0.2, False), (0.3, True), (-0.3, True)):
         x = fit.x.copy()
         x[share] = fit.structure.coordinates[share].x(value)
-        assert departed(replace(fit, x=x), 0) is far
+        assert departed(p.short, replace(fit, x=x), 0) is far
+
+
+@pytest.mark.parametrize(("period_s", "in_step"), [(7.32, True), (7.40, True), (5.0, False), (14.6, False)])
+def test_a_bias_that_swings_as_the_motion_does_is_none(period_s, in_step):
+    """Six strokes of 7.32 s: what swings with them is friction, whatever else."""
+    _, p, fit = fitted("force_bias", "constant", "swinging")
+    cause = fit.structure.causes[0]
+    fit = replace(
+        fit, x=fit.structure.x(fit.x[: fit.structure.of_cause(0).start], [{**cause.start, "period": period_s}])
+    )
+    time_s = np.linspace(0.0, 43.9, p.short.size)
+    strokes = replace(p.short, time_s=time_s, position_mm=20.0 * np.abs(2.0 * np.mod(time_s / 7.32, 1.0) - 1.0))
+    assert departed(strokes, fit, 0) is in_step
 
 
 @pytest.mark.parametrize("led", ["unilateral", "film"])
 def test_a_shape_without_numbers_of_its_own_has_none_at_a_bound(led):
     c, p, fit = fitted("separation", "clean", led)
-    assert not departed(fit, 0)
+    assert not departed(p.short, fit, 0)
     assert reshaped(p.short, fit).structure.causes[0].id == "separation"
 
 
