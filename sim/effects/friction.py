@@ -24,8 +24,7 @@ since the last reversal, rises with it, and is a continuous function of position
   F_c (1 + two terms of a Fourier series over `reach`), so that F_c is the mean over the depths (B. Armstrong-Hélouvry,
   Control of Machines with Friction, Kluwer, 1991: friction depends on the position).
 - `tight`: Prandtl's element whose slider holds F_c (1 + more · e^(−((y − place)/width)²)): a rail that is dented or
-  dirty at one place, as rails mostly are where they are used least (B. Armstrong-Hélouvry, the same). F_c is that far
-  from there.
+  dirty at one place (B. Armstrong-Hélouvry, the same). F_c is that far from there.
 - `logarithmic`: Prandtl's element whose slider holds F_c (1 + growth ln((v_0 + |v|)/(v_0 + 1 mm/s))), v_0 = 0.1 mm/s:
   polymers creep over what they slide on, and so bear more the quicker they go (B. J. Briscoe, D. Tabor, Friction and
   wear of polymers: the role of mechanical properties, Br. Polym. J. 10, 1978, 74–78). F_c is that at 1 mm/s.
@@ -278,22 +277,10 @@ _PRESLIDING = Parameter(
 )
 
 _STATIC_RATIO = Parameter(
-    "static_ratio",
-    "1",
-    1.0,
-    3.0,
-    1.6,
-    "friction near rest over friction while sliding, F_s/F_c",
-    starts=(1.2, 2.0),
+    "static_ratio", "1", 1.0, 3.0, 1.6, "friction near rest over friction while sliding, F_s/F_c", starts=(1.2, 2.0)
 )
 _STRIBECK_SPEED = Parameter(
-    "stribeck_speed",
-    "mm/s",
-    1e-2,
-    10.0,
-    2.0,
-    "speed at which the excess at rest has fallen to 1/e",
-    starts=(0.5, 5.0),
+    "stribeck_speed", "mm/s", 1e-2, 10.0, 2.0, "speed at which the excess at rest has fallen to 1/e", starts=(0.5, 5.0)
 )
 _VISCOUS = Parameter("viscous", "N*s/mm", 0.0, 1000.0, 0.0, "further force per speed")
 
