@@ -118,7 +118,8 @@ def missed(found: Moves, time_s: Array, position_mm: Array, noise_mm: float) -> 
     """
     power, parts = 0.0, 0
     for (first, last), move in found.items():
-        off = (position_mm - move.position(time_s))[first : last + 1] / noise_mm
+        inside = slice(first, last + 1)
+        off = (position_mm[inside] - move.position(time_s[inside])) / noise_mm
         for part in np.array_split(off, max(min(PARTS, len(off) // SHORTEST), 1)):
             power, parts = power + float(np.sum(part)) ** 2 / len(part), parts + 1
     return power / max(parts, 1), max(parts, 1)
@@ -156,7 +157,7 @@ def _told(found: Moves, time_s: Array, position_mm: Array, noise_mm: float) -> M
         begin_s, end_s = move.span_s()
         a = min(first, max(int(np.searchsorted(time_s, begin_s)) - 1, 0))
         b = max(last, min(int(np.searchsorted(time_s, end_s)) + 1, len(time_s) - 1))
-        off = (position_mm - move.position(time_s))[a : b + 1] / noise_mm
+        off = (position_mm[a : b + 1] - move.position(time_s[a : b + 1])) / noise_mm
         n = len(off)
         if n >= LEAST and float(np.sum(off**2)) <= 1.2 * n + AGREED * np.sqrt(2.0 * n):
             out[a, b] = move

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -104,30 +104,39 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
 def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple[list[Fit], list[float], list[float]]:
     """The chain of those causes that what was held out needs, with its held-out squares and excesses. `final`: all that
     were found, in their best shapes."""
-    base, plain = path.fits[0], path.fits[-1]
+    base = path.fits[0]
     apart = _flagged_square(prepared, base)
 
     def needless(fits: list[Fit], squares: list[float], excess: list[float]) -> int | None:
+        if len(fits) < 2:
+            return None
         slow = _slow_squares(prepared, fits, squares)
         number = _needless(prepared, fits, squares, excess, apart, slow)
         return _doubtful(path, fits, excess, apart, floor_N, slow) if number is None else number
 
     fits = chain(prepared, final, base, path.fits)
     squares, excess = excesses(prepared, fits, floor_N)
-    shapes, as_found = (set(shapes_of(fit.structure)) for fit in (final, plain))
-    # it may be the shape that does harm, and not the cause
-    others: list[Callable[[Fit], Fit]] = [lambda fit: plain] if shapes != as_found else []
-    others.append(lambda fit: steadier(prepared.short, fit, len(base.structure.causes)))
-    while len(fits) > 1 and (number := needless(fits, squares, excess)) is not None:
-        while others:
-            other = others.pop(0)(fits[-1])
-            if other is not fits[-1]:
-                again = chain(prepared, ordered(prepared, other, base), base, path.fits)
-                of_them = excesses(prepared, again, floor_N)
-                if needless(again, *of_them) is None:
-                    return again, *of_them
+    number = needless(fits, squares, excess)
+    if number is not None:  # it may be the shape that does harm, and not the cause
+        for other in _milder(prepared, path, final):
+            again = chain(prepared, ordered(prepared, other, base), base, path.fits)
+            of_them = excesses(prepared, again, floor_N)
+            if needless(again, *of_them) is None:
+                return again, *of_them
+    while number is not None:
         fits, squares, excess = _dropped(prepared, path, fits, number, floor_N)
+        number = needless(fits, squares, excess)
     return fits, squares, excess
+
+
+def _milder(prepared: Prepared, path: Path, final: Fit) -> Iterator[Fit]:
+    """The causes of a fit in the shapes in which they were found, and in the best that have no course in time; where
+    those are others."""
+    if set(shapes_of(final.structure)) != set(shapes_of(path.fits[-1].structure)):
+        yield path.fits[-1]
+    steady = steadier(prepared.short, final, len(path.fits[0].structure.causes))
+    if steady is not final:
+        yield steady
 
 
 def _dropped(
@@ -204,7 +213,7 @@ def _doubtful(
         _, confidence, kind = sureness(path, named[k - 1], named)
         sure = max(confidence, kind)
         taken, trace = excess[k - 1] - excess[k], TRACE * excess[0]
-        if k == 1 and not taken < FAINT * floor_N**2:
+        if k == 1 and taken >= FAINT * floor_N**2:
             continue
         if sure < DOUBTED and _takes_little(excess, k, whole, slow[k - 1]):
             return k - 1

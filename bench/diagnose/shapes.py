@@ -67,13 +67,12 @@ def stand_in(short: Data, fit: Fit) -> tuple[Fit, list[int]]:
 
 def families(short: Data, lead: Fit, indices: Sequence[int]) -> list[list[Member]]:
     """Of each of some causes, the shape that leads and those others of its family that make a plant."""
-    comes_back = lead.structure.in_air or is_rich(short)
     tried = [
         (index, form)
         for index in indices
         for form in lead.structure.causes[index].effect.forms
-        if (comes_back or not form.has_a_course)
         if form.name != lead.structure.causes[index].form.name and _comparable(lead.structure.causes[index].form, form)
+        if not form.has_a_course or lead.structure.in_air or is_rich(short)
     ]
     with ThreadPoolExecutor(WORKERS) as pool:
         found = list(pool.map(lambda pair: _other(short, lead, *pair), tried))
