@@ -388,7 +388,7 @@ def _concluded(
     causes = joined(causes, [replace(c, gain=c.gain / scale) for c in channel if c.gain > least or by_themselves(c)])
     left = excess[-1] / scale if causes and np.isfinite(scale) else 1.0 - sum(c.gain for c in causes)
     if causes:
-        verdict = "explained" if explains(left, causes) else "unexplained"
+        verdict = "explained" if explains(left, causes, not search.reach.rich) else "unexplained"
     else:
         verdict = "unexplained" if told and excess[0] > TOLD * floor**2 else "consistent"
     held_out_N = float(np.sqrt(squares[0] + apart)), float(np.sqrt(squares[-1]))

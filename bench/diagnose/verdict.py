@@ -16,7 +16,7 @@ from .path import Measure, Path, Trial
 from .refit import Fit, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
 from .search import Search
-from .way import most_sure
+from .way import TOLD_ONCE, most_sure
 
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
@@ -111,11 +111,13 @@ def _square_std(prepared: Prepared, fit: Fit) -> float:
     return scatter * float(np.sqrt(prepared.colour.memory / max(len(left), 1)))
 
 
-def explains(left: float, causes: Sequence[CauseFound]) -> bool:
+def explains(left: float, causes: Sequence[CauseFound], once: bool = False) -> bool:
     """Whether causes explain an error of which a share is left: they may leave less, the less sure they are, but for
-    those that take next to nothing; and many of them, of which one is hardly sure, explain nothing."""
+    those that take next to nothing; and many of them, of which one is hardly sure, explain nothing. Nor does a name
+    that acts with the motion where that went one way `once`: it has not beaten an odd pad, which no list of causes
+    has."""
     sure = min((max(c.confidence, c.of_its_kind) for c in causes if c.gain >= SLIGHT), default=1.0)
-    if len(causes) >= MANY and sure < HARDLY:
+    if len(causes) >= MANY and sure < HARDLY or once and sure <= TOLD_ONCE:
         return False
     return left <= EXPLAINED * sure * (0.5 if len(causes) >= MANY else 1.0)
 

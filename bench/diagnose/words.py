@@ -8,6 +8,7 @@ from sim.effects import all_effects
 from sim.effects.reading import force
 
 from .result import Alternative, CauseFound, Diagnosis
+from .verdict import EXPLAINED
 from .way import LEVELS, TOLD_ONCE
 
 NAMES = {
@@ -48,6 +49,7 @@ UNTOLD = 0.7
 LEAST = 0.01
 """Share of the gain below which its size says no more."""
 NOT_KNOWN = "no cause that is known here was found to do all of this: look at what remains before trusting the model"
+NOT_SURE = "names so little sure explain nothing: test them by another run before trusting them or the model"
 REMAINS = 3
 """Sentences on what is left."""
 
@@ -89,9 +91,25 @@ def verdict(d: Diagnosis) -> str:
         told = "can be explained by" if unsure(d) else "is explained by"
         return f"What {'the bench adds' if in_air(d) else 'the model gets wrong'} {told} {named(d)}"
     if d.causes:
+        if not_sure(d):
+            return (
+                f"Unexplained: {named(d)} would take {percent(1 - d.left)} of the error, but something else may as well"
+            )
         verb = "takes" if len(d.causes) == 1 else "take"
         return f"Unexplained: {named(d)} {verb} {percent(1 - d.left)} of the error, no known cause the rest"
     return "Unexplained: no known cause takes what is left"
+
+
+def not_sure(d: Diagnosis) -> bool:
+    """Whether what is unexplained is so for its names alone: little is left."""
+    return d.verdict == "unexplained" and bool(d.causes) and d.left <= EXPLAINED
+
+
+def not_known(d: Diagnosis) -> str:
+    """What it means that a verdict is `unexplained`; empty where it is not."""
+    if d.verdict != "unexplained":
+        return ""
+    return NOT_SURE if not_sure(d) else NOT_KNOWN
 
 
 def unsure(d: Diagnosis) -> bool:
@@ -130,8 +148,7 @@ def lines(d: Diagnosis) -> list[str]:
     if d.verdict != "consistent":
         out += [f"  {sentence}" for sentence in remains(d)]
     out += [f"  {sentence}" for sentence in warnings(d)]
-    if d.verdict == "unexplained":
-        out.append(f"  {NOT_KNOWN}")
+    out += [f"  {sentence}"] if (sentence := not_known(d)) else []
     if d.next_protocol is not None:
         out.append(f"  next test: {d.next_protocol['description']} (`--next FILE` writes the protocol)")
     return out

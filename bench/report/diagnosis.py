@@ -61,8 +61,7 @@ def card(d: Diagnosis, heading: str = "", *, notes: bool = True, remark: str = "
     said = [_sentence(cause.explanation) for cause in d.causes]
     said.append(" ".join(_sentence(words_) for words_ in words.remains(d)) if d.verdict != "consistent" else "")
     said += [_sentence(sentence) for sentence in words.warnings(d)]
-    if d.verdict == "unexplained":
-        said.append(_sentence(words.NOT_KNOWN))
+    said += [_sentence(sentence)] if (sentence := words.not_known(d)) else []
     paragraphs = "".join(f"<p>{markup.text(sentence)}</p>" for sentence in said if sentence)
     before = "error on held-out data, before" if d.causes else "error on held-out data"
     tiles = [(before, force(d.held_out_before))]

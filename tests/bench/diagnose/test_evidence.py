@@ -25,3 +25,13 @@ def test_what_takes_next_to_nothing_leaves_the_rest_as_explained_as_it_is() -> N
     first = replace(made_up().causes[0], gain=0.8, confidence=0.99)
     for gain, explained in ((0.01, True), (0.05, False)):  # a fifth is left, and of a quarter 65 % are 16 %
         assert explains(0.19, [first, replace(first, gain=gain, confidence=0.65)]) is explained
+
+
+@pytest.mark.parametrize(
+    ("once", "confidence", "explained"), [(False, 0.5, True), (True, 0.5, False), (True, 0.9, True)]
+)
+def test_half_sure_names_explain_nothing_where_depths_are_met_once(
+    once: bool, confidence: float, explained: bool
+) -> None:
+    cause = replace(made_up().causes[0], gain=1.0, confidence=confidence)
+    assert explains(0.0, [cause], once) is explained

@@ -84,6 +84,7 @@ def test_two_causes_are_both_named():
         ),
         ({"verdict": "unexplained", "causes": [], "left": 1.0}, "^unexplained: no known cause"),
         ({"verdict": "unexplained", "left": 0.6}, "^unexplained: friction takes 40 % .* no known cause the rest"),
+        ({"verdict": "unexplained", "left": 0.1}, "^unexplained: friction would take 90 % .* something else may"),
         (
             {"verdict": "consistent", "causes": [], "model_dict": {"pad": {"elastic": {"law": "none"}}}},
             "^consistent: the bench in free air",
@@ -97,6 +98,8 @@ def test_verdicts(changes, pattern):
 def test_what_cannot_be_explained_is_not_left_at_that():
     said = lines(made_up(verdict="unexplained", causes=[], left=1.0))
     assert any("no cause that is known here" in line and "look at what remains" in line for line in said)
+    said = lines(made_up(verdict="unexplained", left=0.1))
+    assert any("another run" in line for line in said) and not any("no cause that is known" in line for line in said)
 
 
 def test_errors_that_hardly_differ_are_told_apart():
