@@ -16,6 +16,7 @@ from .refit import Fit, last, reduced, refit
 from .shapes import begun_anew, departed
 from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_first
 
+MUCH, MOST = 0.25, 0.5  # of its gain, and of what is left, that a further cause takes beside a second one of a kind
 AS_WELL = 0.8  # share of a second cause of a kind's gain, that a further cause's beside the first reaches
 CLEAN, UNCLEAN = 0.03, 0.05  # of what was left that a fit leaves: nothing, and something
 RIVALS = 2  # beside the best, that are asked for their best shapes
@@ -123,6 +124,16 @@ class Shaping(Sieve):
     def _reshaped(self, before: float, after: float, reshaped: float) -> bool:
         """Whether another shape of a cause found does what a further cause did. All are χ²."""
         return before - reshaped > AS_WELL * (before - after) and not self._alone_clean(before, after, reshaped)
+
+    def _stays_beside(self, now: Fit, reshaped: Fit, further: Fit) -> bool:
+        """Whether a further cause takes much of what it takes from a fit, and most of what is left, where that has a
+        second one of a kind too: then both are missing, the further cause and the shape."""
+        cause = further.structure.causes[-1].with_start(**further.structure.values(further.x)[-1])
+        both = self._joined(reshaped, cause, ALL, None)
+        if both is None:
+            return False
+        taken, left = reshaped.chi2 - both.fit.chi2, reshaped.chi2 - self.expected
+        return taken > max(MUCH * (now.chi2 - further.chi2), MOST * left)
 
     def _alone_clean(self, before: float, after: float, reshaped: float) -> bool:
         """Whether a further cause leaves nothing, and another shape of a cause found something beyond chance."""

@@ -9,6 +9,8 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
 - `linear`: 1 − rate · travel, down to 0.02.
 - `power`: (1 + k rate · travel)^(−1/k): between linear (k = −1), exponential (0) and hyperbolic (1), and beyond both:
   Kachanov's law, which ends in rupture, has k = −3 or so.
+- `weibull`: e^(−(rate · travel)^shape): a bundle of fibres of which each breaks at its own travel. Above 1 the pad is
+  whole at first and fails within some travel; below 1 it goes on ever slower.
 - `energy`: as exponential, in the travel weighed by (n + 1) (δ/reach)^n, as the work of a spring F ∝ δ^n: deep travel
   counts more, and a stroke down to `reach` as much as elsewhere.
 - `threshold`: e^(−rate · travel/(1 − spared)) of the travel deeper than `spared` times `reach` alone: what stays above
@@ -20,11 +22,12 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   Paving Technol. 44, 1975, 38–74). A stroke down to s, two thirds of `reach`, held there and after it for long, costs
   as much as elsewhere: among strokes of all depths those are about the mean.
 
-`rate` is what a mm of travel takes at first, of the stiffness.
+`rate` is what a mm of travel takes at first, of the stiffness; that of `weibull`, one over the travel that leaves 1/e.
 
 Reference: J. Lemaitre, A Course on Damage Mechanics, 2nd ed., Springer, 1996
 (accumulated strain and energy as measures; chapter 4, fatigue); P. Paris and F. Erdogan, A critical analysis of crack
-propagation laws, J. Basic Eng. 85, 1963.
+propagation laws, J. Basic Eng. 85, 1963; W. Weibull, A statistical distribution function of wide applicability, J.
+Appl. Mech. 18, 1951 (`weibull`).
 """
 
 from __future__ import annotations
@@ -88,6 +91,13 @@ def power(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, power, dead_band)."""
     state[_LAST], state[_TRAVEL] = loaded(depth, p[2], state[_LAST], state[_TRAVEL])
     return _by_power(p[0] * state[_TRAVEL], p[1])
+
+
+@block
+def weibull(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, shape, dead_band)."""
+    state[_LAST], state[_TRAVEL] = loaded(depth, p[2], state[_LAST], state[_TRAVEL])
+    return max(_LEAST, math.exp(-((p[0] * state[_TRAVEL]) ** p[1])))
 
 
 @block
@@ -191,6 +201,18 @@ EFFECT = Effect(
             what="with a power of loading travel",
             parameters=(_RATE, _POWER, _DEAD_BAND),
             blocks={"elastic": power},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="weibull",
+            what="as fibres of which each breaks at its own loading travel",
+            parameters=(
+                _RATE,
+                Parameter("shape", "1", 0.3, 6.0, 1.0, "1: exponential; above, whole at first", starts=(0.6, 2.0)),
+                _DEAD_BAND,
+            ),
+            sought=False,
+            blocks={"elastic": weibull},
             state=(0.0, 0.0),
         ),
         Form(
