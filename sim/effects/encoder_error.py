@@ -14,6 +14,8 @@
   half of the load.
 - `stitched`: Σ r^(n−1) sin n θ/n, a saw tooth with rounded edges: fields of a scale that are each a little too long or
   too short, and begin anew. It is atan(r sin θ/(1 − r cos θ))/r; `amplitude` is that of the first harmonic.
+- `sectors`: a triangular wave that rises over a share `rise` of its period: parts of a scale that are stretched and
+  compressed in turn.
 
 A reported position must rise with the true one; an error so steep that it would not is taken as the steepest that does.
 """
@@ -70,6 +72,21 @@ def stitched(dt: float, x: float, state: State, p: State) -> float:
     """Reported position; p = (amplitude, wave number, phase, sharpness)."""
     angle = p[1] * x + p[2]
     return x + p[0] * math.atan2(p[3] * math.sin(angle), 1.0 - p[3] * math.cos(angle)) / p[3]
+
+
+@block
+def sectors(dt: float, x: float, state: State, p: State) -> float:
+    """Reported position; p = (amplitude, waves per mm, phase in waves, rise)."""
+    turns = p[1] * x + p[2]
+    turns -= math.floor(turns)
+    return x + p[0] * (2.0 * turns / p[3] - 1.0 if turns < p[3] else 1.0 - 2.0 * (turns - p[3]) / (1.0 - p[3]))
+
+
+def _packed_sectors(values: Mapping[str, float]) -> tuple[float, ...]:
+    period, rise = values["period"], values["rise"]
+    amplitude = min(values["amplitude"], 0.5 * _STEEPEST * period * min(rise, 1.0 - rise))
+    # the middle of the rise is where a sine of that phase goes up through 0
+    return (amplitude, 1.0 / period, values["phase"] / (2.0 * math.pi) + 0.5 * rise, rise)
 
 
 def _packed_stitched(values: Mapping[str, float]) -> tuple[float, ...]:
@@ -176,6 +193,19 @@ EFFECT = Effect(
             ),
             blocks={"report": stitched},
             pack=_packed_stitched,
+        ),
+        Form(
+            name="sectors",
+            what="a triangular wave",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("rise", "1", 0.1, 0.9, 0.5, "share of the period in which it rises", starts=(0.5,)),
+            ),
+            sought=False,
+            blocks={"report": sectors},
+            pack=_packed_sectors,
         ),
         Form(
             name="leaning",

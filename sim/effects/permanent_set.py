@@ -17,6 +17,9 @@
   play of ± limit that the depth drags along; `set` is the mean of what has sunk under the deepest and of what stays (W.
   Prager, A new method of analyzing stresses and strains in work-hardening plastic solids, J. Appl. Mech. 23, 1956,
   493–496: the back stress of what has hardened).
+- `lifting`: as the probe goes back, by set · deepest · (1 − e^(−(deepest − y)/within)), and it stays: the law is the
+  pad's as it is pressed first, set in it, as of what is read from the curve of unloading (W. C. Oliver, G. M. Pharr, J.
+  Mater. Res. 7, 1992, 1564–1583).
 
 `deepest` is in the probe's coordinate; the pad's depth is what is left above the sunken surface.
 
@@ -117,6 +120,15 @@ def springing(dt: float, y: float, state: State, p: State) -> float:
     return y - 2.0 * p[0] * state[0]
 
 
+@block
+def lifting(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the sinking surface; p = (set, within); state: deepest, what has sunk."""
+    state[_DEEPEST] = max(state[_DEEPEST], y)
+    sunk = -p[0] * state[_DEEPEST] * math.expm1((max(y, 0.0) - state[_DEEPEST]) / p[1])
+    state[_SUNK] = max(state[_SUNK], sunk)
+    return y - state[_SUNK]
+
+
 _SET = Parameter(
     "set",
     "mm/mm",
@@ -184,6 +196,16 @@ EFFECT = Effect(
             ),
             blocks={"depth": springing},
             state=(0.0,),
+        ),
+        Form(
+            name="lifting",
+            what="as the probe goes back",
+            parameters=(
+                _SET,
+                Parameter("within", "mm", 0.005, 20.0, 0.3, "way back on which it comes", starts=(0.1, 0.5)),
+            ),
+            blocks={"depth": lifting},
+            state=(0.0,) * 2,
         ),
         Form(
             name="gradual",

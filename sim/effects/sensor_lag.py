@@ -22,6 +22,8 @@ value. Each is exact for a force that is linear between samples, at any spacing.
   Processing, 3rd ed., Prentice Hall, 2010, chapter 7).
 - `throttled`: 1/(1 + τ(1 − u)s) as the force rises and 1/(1 + τ(1 + u)s) as it falls, as of a hydraulic cell behind a
   throttle with a valve (Doebelin, chapter 6). A step that begins on one side of the force ends on it.
+- `slewing`: one pole, whose output goes no faster than at_force/(slow · τ): the slew rate of an amplifier, or a pen's
+  (Doebelin, chapters 3 and 12).
 - `loaded`: one pole of the time τ e^(growth (y/at_force − 1)), which goes with the force y that is there: air in a cell
   of oil gives way the less, the more it bears (H. E. Merritt, Hydraulic Control Systems, Wiley, 1967, section 1.3).
 - `warming`: one pole of the time τ e^(growth u + bend (3u² − 1)/2), u = t/at_time − 1, which goes with the time since
@@ -78,6 +80,17 @@ def throttled(dt: float, u: float, state: State, p: State) -> float:
     rises = 0.5 * (state[_LAST] + u) > state[_Y]
     tau = p[0] * (1.0 - p[1] if rises else 1.0 + p[1])
     y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, tau)
+    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
+    return y
+
+
+@block
+def slewing(dt: float, u: float, state: State, p: State) -> float:
+    """One pole, whose output has a greatest rate; p = (time_constant, slow, at_force)."""
+    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, p[0])
+    if state[_STARTED] != 0.0 and p[0] > 0.0 and p[1] > 0.0:
+        most = dt * p[2] / (p[1] * p[0])
+        y = min(max(y, state[_Y] - most), state[_Y] + most)
     state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
     return y
 
@@ -414,6 +427,27 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"sensor": throttled},
+            state=(0.0,) * 3,
+        ),
+        Form(
+            name="slewing",
+            what="one pole, with a greatest rate",
+            parameters=(
+                _TIME_CONSTANT,
+                Parameter(
+                    "slow",
+                    "1",
+                    0.0,
+                    50.0,
+                    3.0,
+                    "`at_force` over the time constant, over the greatest rate",
+                    default=0.0,
+                    starts=(1.0, 4.0),
+                ),
+                Parameter("at_force", "N", 1e-3, 1e5, 5.0, "force that tells the greatest rate", fixed=True),
+            ),
+            sought=False,
+            blocks={"sensor": slewing},
             state=(0.0,) * 3,
         ),
         Form(

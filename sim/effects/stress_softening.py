@@ -39,6 +39,11 @@ The factor on F^e depends on depth δ and on the deepest depth so far; loading b
   (J. C. Simo, On a fully three-dimensional finite-strain viscoelastic damage model, Comput. Methods Appl. Mech. Eng.
   60, 1987, 153–173).
 
+- `alteration`: 1 − share (1 − e^(−deepest/whole)) (1 − e^(−((deepest − δ)/depth)^n)): links break the more, the further
+  the network was ever stretched, and the virgin curve is met at the deepest point (G. Marckmann, E. Verron, L.
+  Gornet, G. Chagnon, P. Charrier, P. Fort, A theory of network alteration for the Mullins effect, J. Mech. Phys. Solids
+  50, 2002, 2011–2028).
+
 State: the deepest depth. Reference: L. Mullins, Softening of rubber by deformation, Rubber Chem. Technol. 42, 1969,
 339–362.
 """
@@ -115,6 +120,14 @@ def relative(dt: float, depth: float, state: State, p: State) -> float:
     here = max(depth, 0.0)
     state[0] = max(state[0], here, p[2])
     return 1.0 - p[0] * (1.0 - (here / state[0]) ** p[1]) if state[0] > 0.0 else 1.0
+
+
+@block
+def alteration(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (share, depth, exponent, whole, already)."""
+    here = max(depth, 0.0)
+    state[0] = max(state[0], here, p[4])
+    return 1.0 - p[0] * math.expm1(-state[0] / p[3]) * math.expm1(-(((state[0] - here) / p[1]) ** p[2]))
 
 
 @block
@@ -323,6 +336,20 @@ EFFECT = Effect(
             blocks={"elastic": relative},
             state=(0.0,),
             pack=_relative,
+        ),
+        Form(
+            name="alteration",
+            what="softer the deeper it was pressed, but at the deepest point",
+            parameters=(
+                _SHARE,
+                _DEPTH,
+                Parameter("exponent", "1", 0.5, 4.0, 1.0, "power of the distance", starts=(1.0, 2.0)),
+                Parameter("whole", "mm", 0.01, 50.0, 0.5, "deepest depth that breaks 1 − 1/e of it", starts=(0.3, 1.5)),
+                _ALREADY,
+            ),
+            sought=False,
+            blocks={"elastic": alteration},
+            state=(0.0,),
         ),
         Form(
             name="root",
