@@ -41,6 +41,7 @@ STEADY = 0.02  # relative doubt of every level: no noise is exactly of this form
 HARDLY_ANY = 0.5  # of what noise leaves, in power: so little only a simulation without noise does
 FINEST, NEARLY_ALL = 2e-5, 0.99  # of the force that nearly all samples are below
 MISFIT = 2.0  # times better must colour make the fit of noise with structure beside it
+WIDTHS = range(2, 17)  # samples of a running mean
 COLOURED, PAYS = 3.0, 20.0  # twice the log-likelihood by which colour, and structure beside the noise, must better it
 
 
@@ -162,31 +163,65 @@ def _levels(parts: list[tuple[Array, Array]], sample_s: float) -> list[_Level]:
     return out
 
 
-def _plain(m: int, phi: complex) -> float:
-    """E of a square for unit noise of ρ_k = Re φ^k."""
-    if phi == 0.0:
-        return 6.0 / m
-    k = np.arange(1, m)
-    own = m + 2.0 * np.sum((m - k) * phi**k)
-    reach = (1.0 - phi**m) / (1.0 - phi)
-    return float(np.real(6.0 * own - 8.0 * phi * reach**2 + 2.0 * phi ** (m + 1) * reach**2)) / m**2
+@dataclass(frozen=True)
+class _Fading:
+    """Unit noise of ρ_k = Re φ^k."""
+
+    phi: complex
+
+    def square(self, m: int) -> float:
+        """E of a square."""
+        phi = self.phi
+        if phi == 0.0:
+            return 6.0 / m
+        k = np.arange(1, m)
+        own = m + 2.0 * np.sum((m - k) * phi**k)
+        reach = (1.0 - phi**m) / (1.0 - phi)
+        return float(np.real(6.0 * own - 8.0 * phi * reach**2 + 2.0 * phi ** (m + 1) * reach**2)) / m**2
+
+    def times(self, Q: Array) -> Array:
+        """R Q, by two recursions."""
+        if self.phi == 0.0:
+            return Q
+        forward = lfilter([1.0], [1.0, -self.phi], Q, axis=0)
+        backward = lfilter([1.0], [1.0, -self.phi], Q[::-1], axis=0)[::-1]
+        return np.asarray(np.real(forward + backward)) - Q
 
 
-def _expected(parts: list[tuple[Array, Array]], levels: list[_Level], phi: complex) -> list[Array]:
-    """By level, E of each square (k,) for unit noise of ρ_k = Re φ^k, of which the projections took their part."""
+@dataclass(frozen=True)
+class _Averaged:
+    """Unit noise of ρ_k = 1 − k/width, as white noise has after a running mean: it forgets all at once."""
+
+    width: int
+
+    def square(self, m: int) -> float:
+        """E of a square."""
+        weights = np.repeat([1.0, -2.0, 1.0], m) / m
+        k = np.arange(1, min(self.width, len(weights)))
+        alike = [float(weights[j:] @ weights[:-j]) for j in k.tolist()]
+        return float(weights @ weights + 2.0 * np.sum((1.0 - k / self.width) * alike))
+
+    def times(self, Q: Array) -> Array:
+        """R Q, by two running sums."""
+        n, w = len(Q), self.width
+        padded = np.concatenate([np.zeros((w, Q.shape[1])), Q, np.zeros((w, Q.shape[1]))])
+        once = np.cumsum(padded, axis=0)
+        once = once[w:] - once[:-w]
+        twice = np.cumsum(np.concatenate([np.zeros((1, Q.shape[1])), once]), axis=0)
+        return np.asarray((twice[w:] - twice[:-w])[:n] / w)
+
+
+def _expected(parts: list[tuple[Array, Array]], levels: list[_Level], noise: _Fading | _Averaged) -> list[Array]:
+    """By level, E of each square (k,) for unit noise, of which the projections took their part."""
     out: list[list[Array]] = [[] for _ in levels]
     for number, (_, Q) in enumerate(parts):
-        RQ = Q
-        if phi != 0.0:  # R Q by two recursions
-            forward = lfilter([1.0], [1.0, -phi], Q, axis=0)
-            backward = lfilter([1.0], [1.0, -phi], Q[::-1], axis=0)[::-1]
-            RQ = np.asarray(np.real(forward + backward)) - Q
+        RQ = noise.times(Q)
         inner = Q.T @ RQ
         for level, own in zip(levels, out, strict=True):
             bent = level.bent[number]
             if len(bent):
                 own.append(np.einsum("ij,ij->i", bent, bent @ inner - 2.0 * _bent(RQ, level.m)))
-    return [np.concatenate(own) + _plain(level.m, phi) for level, own in zip(levels, out, strict=True)]
+    return [np.concatenate(own) + noise.square(level.m) for level, own in zip(levels, out, strict=True)]
 
 
 def _steady(level: _Level, white: Array, windows: int) -> Mask:
@@ -211,7 +246,7 @@ def _together(m: int) -> float:
 def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     """σ, a and φ under which the squares found are likeliest."""
     levels = _levels(parts, sample_s)
-    white = _expected(parts, levels, 0.0)
+    white = _expected(parts, levels, _Fading(0.0))
     windows = 1 + max(int(level.window.max()) for level in levels)
     keep = np.logical_and.reduce([_steady(level, w, windows) for level, w in zip(levels, white, strict=True)])
     at = [keep[level.window] for level in levels]
@@ -222,7 +257,7 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
 
     def tail(memory_s: float, frequency_Hz: float = 0.0) -> Array:
         turn = np.exp(-sample_s / memory_s + 2j * np.pi * frequency_Hz * sample_s)
-        return mean(_expected(parts, levels, complex(turn) if frequency_Hz else float(turn.real)))
+        return mean(_expected(parts, levels, _Fading(complex(turn) if frequency_Hz else float(turn.real))))
 
     plain, found = mean(white), mean([level.square for level in levels])
     if len(found) < 3 or not found.all():  # a channel without noise stands still in air
@@ -231,6 +266,14 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     memories = [0.0, *np.geomspace(0.5 * sample_s, max(MEMORY_S, sample_s), 20).tolist()]
     noises = [[plain] if memory == 0.0 else [plain, tail(memory)] for memory in memories]
     best = _best(memories, noises, [], found, weight)
+    if best[0] > PAYS:
+        widths = [w for w in WIDTHS if w * sample_s < MEMORY_S]
+        averages = [[plain, mean(_expected(parts, levels, _Averaged(w)))] for w in widths]
+        # of what fades, the memory that adds up to as many samples: near enough to make it white
+        fades_s = [sample_s / float(np.log((w + 1) / (w - 1))) for w in widths]
+        averaged = _best(fades_s, averages, [], found, weight)
+        if averaged[0] + PAYS < best[0]:
+            best, memories, noises = averaged, [0.0, *fades_s], [[plain], *averages]
     if best[0] > PAYS:
         beside = [tail(memory) for memory in SLOWER_S]
         # (1 + x) e^−x

@@ -35,6 +35,22 @@ def test_noise_of_any_kind_is_told_by_the_holds(kind):
         assert _told(draw_case(seed, (), noise_kind=kind, own_clock=False)) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.parametrize(
+    "width", [3, 7, pytest.param(5, marks=pytest.mark.long), pytest.param(12, marks=pytest.mark.long)]
+)
+def test_noise_of_a_running_mean_forgets_all_at_once(width: int) -> None:
+    """It has less power than what fades has where that is slow, which would be taken for something beside the noise."""
+    told = []
+    for seed in range(40):
+        rng, parts = np.random.default_rng(seed), []
+        for _ in range(int(rng.integers(8, 25))):
+            n = int(rng.integers(80, 1000))
+            e = np.convolve(rng.standard_normal(n + width - 1), np.full(width, 1.0 / np.sqrt(width)), "valid")
+            parts.append(_about_curve(0.0025 * np.arange(n), e))
+        told.append(_matched(parts, 0.0025).force_N)
+    assert np.mean(np.abs(np.array(told) - 1.0) < 0.1) >= 0.95
+
+
 @pytest.mark.parametrize(("id", "shape"), [
     pytest.param("knocks", "thump", marks=pytest.mark.long),  # in some holds, for a while
     pytest.param("knocks", "table", marks=pytest.mark.long),
