@@ -11,13 +11,14 @@ from bench.felt_motion import resolution
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 
-from .channel import FEW, Faults, far, not_of_the_motion, of_the_model, resting, runs, standing_off, strays
+from .channel import FEW, Faults, far, not_of_the_motion, of_the_model, resting, standing_off, strays
 from .data import Prepared, prepare
 from .noise import least_N
 from .path import Path
 from .pulses import pulses
 from .refit import Fit, force_at, onto
 from .search import Search
+from .stuck import runs
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -9,24 +9,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 from scipy.stats import t as student_t
 
 from bench.felt_motion import resolution
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 
-from .coarse import coarse_repeats, noise_steps
+from .coarse import coarse_repeats
+from .stuck import CHANCE, FEW_REPEATS, LEAPS, equal_by_chance, no_accident, repeated, runs, slowed
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-AGAIN = 0.01  # of the samples that repeat the one before, at the least, where digits are not so many
-FEW_REPEATS = 4  # equal pairs that are no accident where digits are many
-CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
-HARDLY = 0.8  # steps: less noise hardly leaves one where the force is at rest
-STANDS = 0.5  # share of equal pairs beyond which noise is less than half a step
-LEAPS = 3  # steps by which what has stuck in such a channel catches up, at the least
 SETTLING = 20  # samples after a move that are not yet a hold
 LEAVING = 3  # samples at the end of a hold that may already move
 CROWDED = 3.0  # times as many outliers in moves as in holds: then those are none
@@ -42,7 +36,6 @@ AT_LAST = 0.75  # of a knee, where it is at its end
 NARROWED, SLOW, JUMPS = 2.0, 4.0, 4.0  # usual second differences: below a ceiling, where any narrows the noise; that
 # a slow force changes by; and the largest that count
 BENT = 15.0  # logarithm of the likelihood that a width must gain over none to be known, or lose to be excluded
-SLOWED = (2, 3, 4)  # samples that a channel says one value for, when it is for a while that much slower
 BESIDE = 5  # neighbours on either side that a stray sample is held against: bursts are shorter
 ASIDE, CALM = 8, 0.6  # neighbours on either side of a force or a residual, and their share that a burst leaves alone
 FAR = 6.0  # noise deviations that an outlier stands off at the least
@@ -107,7 +100,7 @@ def faults(force_N: Array) -> Faults:
         saturated, bent = saturated | ended, bent & ~(saturated | ended)
     # just below a ceiling that is not sharp a channel repeats itself too
     ended = saturated if limit is None else saturated | (force_N * np.sign(limit) > NEARLY * abs(limit))
-    stuck = _stuck(force_N, ended) | _slowed(force_N, ended)
+    stuck = repeated(force_N, ended) | slowed(force_N, ended)
     halted, share = coarse_repeats(force_N, ended | stuck)
     if not stuck.any():
         stuck = halted
@@ -131,15 +124,9 @@ def _stray_again(force: Array, outlier: Mask, stuck: Mask) -> Mask:
 def _one_value(force: Array, outlier: Mask) -> Mask:
     """Samples with a value that stray ones have again and again, where readings have many digits."""
     values, count = np.unique(force[outlier], return_counts=True)
-    if resolution(force) == 0.0 and _no_accident(int(count.max(initial=0)), _equal_by_chance(force)):
+    if resolution(force) == 0.0 and no_accident(int(count.max(initial=0)), equal_by_chance(force)):
         return np.isin(force, values[count >= FEW_REPEATS])
     return np.zeros(len(force), dtype=bool)
-
-
-def runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """(first sample, length) of every run of equal values."""
-    first = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
-    return first, np.diff(np.concatenate([first, [len(values)]]))
 
 
 def _ceiling(force: Array) -> tuple[Mask, float | None]:
@@ -267,84 +254,6 @@ def _neighbours(values: Array, reach: int) -> Array:
     """Of each value (m,) the others up to so many away on either side (2 reach, m), mirrored at the ends."""
     padded = np.pad(values, reach, mode="reflect")
     return np.stack([padded[k : k + len(values)] for k in range(2 * reach + 1) if k != reach])
-
-
-def _slowed(force: Array, but: Mask) -> Mask:
-    """Samples that say again what the channel said before, for a while every other one or all but every so many."""
-    mask, same = np.zeros(len(force), dtype=bool), np.concatenate([[False], force[1:] == force[:-1]])
-    # where it repeats itself the most anyway: in holds
-    window = min(max(len(force) // 40, 20), len(force))
-    shares = np.convolve(same & ~but, np.ones(window) / window, mode="valid")
-    chance = min(max(float(np.quantile(shares, 0.9)), 0.05), 0.97)
-    for every in SLOWED:
-        least = int(np.ceil(np.log(CHANCE / len(force)) / np.log(chance) / (every - 1))) + 1
-        for phase in range(every):
-            count = (len(force) - phase) // every
-            group = np.arange(phase, phase + count * every).reshape(count, every)
-            again = np.all(same[group[:, 1:]] & ~but[group[:, 1:]], axis=1).astype(np.int8)
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], again, [0]]))).reshape(-1, 2)
-            for first, last in edges[np.diff(edges, axis=1)[:, 0] >= least].tolist():
-                if np.mean(same[group[first:last, 0]]) < 0.5 * (1.0 + chance):  # else it is one long run
-                    mask[group[first:last, 1:].ravel()] = True
-    return mask
-
-
-def _stuck(force: Array, but: Mask) -> Mask:
-    """Samples that repeat the one before in runs longer than resolution and noise make them."""
-    mask = np.zeros(len(force), dtype=bool)
-    first, length = runs(force)
-    if np.count_nonzero(~but[first]) < 2:
-        return mask
-    # how often a sample equals the one before when nothing sticks: judged where values change most
-    same = np.concatenate([[0.0], (np.diff(force) == 0).astype(float)])
-    step, caught = resolution(force), np.zeros(len(first), dtype=bool)
-    if step > 0.0:
-        window = max(len(force) // 40, 20)
-        shares = np.convolve(same, np.ones(window) / window, mode="same")
-        p = max(float(np.median(shares[window:-window] if len(force) > 3 * window else shares)), 0.05)
-        # neighbours are apart as often as noise crosses a step's edge, of which there is one wherever the force is
-        noise = noise_steps(force, step)
-        if p > STANDS:
-            noise = np.fmin(noise, 0.5 * np.sqrt(np.pi) * (1.0 - p))
-        if noise < HARDLY:  # it hardly leaves a step: in its middle a force stands long, but nothing leaps in the end
-            caught = (length >= _least(min(p, 0.97), len(force))) & _catches_up(force, first, length, step)
-            p = float(np.clip(2.0 * norm.cdf(0.5 / max(noise, 1e-3)) - 1.0, p, 1.0 - 1e-12))
-    else:
-        chance = _equal_by_chance(force)
-        p = 0.0 if _no_accident(int(same.sum()), chance) else min(max(chance / len(force), AGAIN), 0.97)
-    long = ((length >= _least(p, len(force))) | caught) & ~but[first]
-    for start, count in zip(first[long].tolist(), length[long].tolist(), strict=True):
-        mask[start + 1 : start + count] = True
-    return mask
-
-
-def _least(p: float, samples: int) -> float:
-    """The shortest run that is no accident anywhere in the data, where a sample equals the one before by chance `p`."""
-    return float(np.ceil(np.log(CHANCE / samples) / np.log(p))) + 1.0 if p > 0.0 else 2.0
-
-
-def _catches_up(force: Array, first: NDArray[np.intp], length: NDArray[np.intp], step: float) -> Mask:
-    """Of runs (r,), whether the force leaps by some steps at the end, and goes on much slower: no move does so."""
-    end = np.minimum(first + length, len(force) - 2)
-    leap, then = np.abs(force[end] - force[end - 1]), np.abs(force[end + 1] - force[end])
-    return np.asarray((first + length < len(force) - 1) & (leap > (LEAPS - 0.5) * step) & (then < leap / 3.0))
-
-
-def _no_accident(repeats: int, chance: float) -> bool:
-    """Whether equal samples are far more than the `chance` ones."""
-    return repeats >= FEW_REPEATS and repeats > 8.0 * chance
-
-
-def _equal_by_chance(force: Array) -> float:
-    """How many samples agree with the one before by chance, in a channel of many digits."""
-    change = np.abs(np.diff(force))
-    least = 1e-9 * float(np.ptp(force))
-    sizes, counts = np.unique(np.rint(change[change > least] / max(least, 1e-300)), return_counts=True)
-    if counts.max(initial=0) >= FEW_REPEATS:  # changes come in steps: those of 0 are as many as of one step either way
-        return 0.5 * float(counts.max())
-    finest = least * float(sizes[0]) if len(sizes) else 0.0
-    scatter = 1.4826 * float(np.median(change))
-    return len(force) * finest / max(float(np.sqrt(2.0 * np.pi)) * scatter, 1e-300)
 
 
 def _spikes(force: Array, good: Mask) -> Mask:

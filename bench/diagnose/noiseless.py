@@ -9,8 +9,9 @@ import numpy as np
 from bench.felt_motion import resolution
 from bench.recording.types import Measurement
 
-from .channel import Faults, resting, runs
+from .channel import Faults, resting
 from .noise import force_noise, least_N
+from .stuck import runs
 
 CRESTS, AT_A_CREST = 12, 4  # runs, and samples in one, that may be equal as a force turns
 

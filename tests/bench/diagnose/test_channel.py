@@ -432,3 +432,14 @@ def test_a_fine_scale_that_repeats_itself_by_chance_does_not_stick(seed, other_z
     held = force.copy()
     held[3000:3020] = held[2999]
     assert faults(held).stuck[3001:3019].all() and faults(held).stuck.sum() < 24
+
+
+def test_runs_of_a_coarse_channel_are_told_by_how_many_of_them_are_long() -> None:
+    """Each of 3 to 20 samples might be an accident; so many of a dozen and more are none."""
+    hits, found, true = 0, 0, 0
+    for seed in range(12):
+        c = draw_case(seed, ("stuck_samples",), 1.0, "short_runs", noise_kind="quantised", own_clock=False)
+        first = np.unique(c.time_s, return_index=True)[1]
+        told, stuck = faults(c.force_N[first]).stuck, c.truth.flags["stuck"][first]
+        hits, found, true = hits + int((told & stuck).sum()), found + int(told.sum()), true + int(stuck.sum())
+    assert hits > 0.9 * found and hits > 0.5 * true
