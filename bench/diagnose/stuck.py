@@ -58,13 +58,7 @@ def repeated(force: Array, but: Mask) -> Mask:
         return mask
     # how often a sample equals the one before when nothing sticks: judged where values change most
     same = np.concatenate([[0.0], (np.diff(force) == 0).astype(float)])
-    step, caught = resolution(force), np.zeros(len(first), dtype=bool)
-
-    def amid(noise: float) -> float:
-        """The same, in the middle of a step."""
-        middle = 2.0 * float(norm.cdf(0.5 / max(noise, 1e-3))) - 1.0 if np.isfinite(noise) else 0.0
-        return min(max(middle, p), 1.0 - 1e-12)
-
+    step, counted = resolution(force), ~but[first]
     if step > 0.0:
         window = max(len(force) // 40, 20)
         shares = np.convolve(same, np.ones(window) / window, mode="same")
@@ -73,15 +67,19 @@ def repeated(force: Array, but: Mask) -> Mask:
         noise = noise_steps(force, step)
         if p > STANDS:
             noise = np.fmin(noise, 0.5 * np.sqrt(np.pi) * (1.0 - p))
+        middle = 2.0 * float(norm.cdf(0.5 / max(noise, 1e-3))) - 1.0 if np.isfinite(noise) else p
+        in_the_middle = min(max(middle, p), 1.0 - 1e-12)
         if noise < HARDLY:  # it hardly leaves a step: in its middle a force stands long, but nothing leaps in the end
-            caught = (length >= _least(min(p, 0.97), len(force))) & _catches_up(force, first, length, step)
-            p = amid(noise)
-        long = ~but[first] & (caught | (length >= _least(p, len(force))))
-        long |= ~but[first] & (length >= _least_of_many(length[~but[first]], amid(noise), bool(long.any())))
+            long = (length >= _least(min(p, 0.97), len(force))) & _catches_up(force, first, length, step)
+            long |= length >= _least(in_the_middle, len(force))
+        else:
+            long = length >= _least(p, len(force))
+        long |= length >= _least_of_many(length[counted], in_the_middle, bool(np.any(long & counted)))
     else:
         chance = equal_by_chance(force)
         p = 0.0 if no_accident(int(same.sum()), chance) else min(max(chance / len(force), AGAIN), 0.97)
-        long = ~but[first] & (length >= _least(p, len(force)))
+        long = length >= _least(p, len(force))
+    long &= counted
     for start, count in zip(first[long].tolist(), length[long].tolist(), strict=True):
         mask[start + 1 : start + count] = True
     return mask
