@@ -102,11 +102,31 @@ def asked_again(
         flags = _strays_again(m, prepared, flags, errors, modelled, known)
     if np.array_equal(flags.good, before.good):
         return prepared, before, search, path
-    anew = prepare(m, flags.good).doubting(prepared.felt)
-    prepared = anew.white() if prepared.memory == 1.0 else anew
+    return _carried_on(prepare(m, flags.good), prepared, flags, search, path)
+
+
+def hum_asked_again(
+    m: Measurement, prepared: Prepared, flags: Faults, search: Search, path: Path
+) -> tuple[Prepared, Faults, Search, Path]:
+    """Hum that is steady by the times at which the forces were felt, and not by their stamps, taken out as well."""
+    last = path.fits[-1]
+    plant = last.structure.cascade(last.x)
+    if prepared.hum is not None or not plant.shifts_time:
+        return prepared, flags, search, path
+    anew = prepare(m, flags.good, plant.felt_at)
+    if anew.mains is None:
+        return prepared, flags, search, path
+    return _carried_on(anew, prepared, flags, search, path)
+
+
+def _carried_on(
+    anew: Prepared, before: Prepared, flags: Faults, search: Search, path: Path
+) -> tuple[Prepared, Faults, Search, Path]:
+    """A search's fits on data that were prepared anew."""
+    anew = anew.doubting(before.felt)
+    prepared = anew.white() if before.memory == 1.0 else anew
     again = Search(prepared, search.believed, search.progress, search.known)
-    path = replace(path, fits=[onto(f, prepared.short, 15, 1e-8) for f in path.fits])
-    return prepared, flags, again, path
+    return prepared, flags, again, replace(path, fits=[onto(f, prepared.short, 15, 1e-8) for f in path.fits])
 
 
 def _unsure(flags: Faults) -> Mask:

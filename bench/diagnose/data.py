@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -242,8 +243,9 @@ class Prepared:
         return float(np.sqrt(2.0 * (own + together))) / n
 
 
-def prepare(m: Measurement, good: Mask) -> Prepared:
-    """Grid, noise and stand-in. `good` (m,): force samples that are not channel faults. Raises InputError where there
+def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None = None) -> Prepared:
+    """Grid, noise and stand-in. `good` (m,): force samples that are not channel faults. `felt_at`: when forces with
+    stamps (m,) were felt, s, where that is known not to be when they say; hum goes by it. Raises InputError where there
     is next to nothing to work on.
     """
     m = restamped(m)
@@ -269,11 +271,13 @@ def prepare(m: Measurement, good: Mask) -> Prepared:
         )
     sample_s = float(np.median(np.diff(m.force_time_s)))
     begins_s = float(m.position_time_s[0])
-    line = find(begins_s, hold_errors(m, good), m.force_time_s, m.force_N)
+    felt_s = m.force_time_s if felt_at is None else felt_at(m.force_time_s)
+    errors = [(np.interp(t, m.force_time_s, felt_s), e, Q) for t, e, Q in hold_errors(m, good)]
+    line = find(begins_s, errors, felt_s, m.force_N)
     line = None if line is not None and line.amplitude_N < least_N(m) else line
     taken_N = np.zeros(len(m.force_N))
     if line is not None:
-        taken_N = line.force_N(m.force_time_s - begins_s, m.force_N)
+        taken_N = line.force_N(felt_s - begins_s, m.force_N)
         m = replace(m, force_N=m.force_N - taken_N)
     motion = felt(m.position_time_s, m.position_mm)
     noise = force_noise(m, good)

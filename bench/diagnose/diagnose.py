@@ -18,7 +18,7 @@ from sim.effects import all_effects
 from sim.model import Model
 from sim.pad import Pad
 
-from .asked_again import asked_again, with_pulses
+from .asked_again import asked_again, hum_asked_again, with_pulses
 from .candidates import CHANNEL
 from .channel import Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, hum_cause, joined
@@ -88,6 +88,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     path = search.path(base)
     prepared = search.prepared
     prepared, flags, search, path = asked_again(m, prepared, flags, search, path)
+    prepared, flags, search, path = hum_asked_again(m, prepared, flags, search, path)
     base = path.fits[0]
     final = reshaped(prepared.short, path.fits[-1], len(base.structure.causes))
     final = ordered(prepared, final, base, path.fits)

@@ -221,7 +221,7 @@ def _given_its_course(final: Fit, index: int, name: str) -> float:
     own = at.start + [p.name for p in fitted].index(name)
     waves = [at.start + k for k, p in enumerate(fitted) if p.spread is not None]
     covariance = final.covariance()
-    std = np.sqrt(np.diag(covariance))
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if not waves or std[own] == 0.0:
         return 1.0
     chosen = [own, *(k for k in waves if std[k] > 0.0)]
