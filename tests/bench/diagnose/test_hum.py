@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -71,3 +72,22 @@ def test_what_swings_in_the_holds_alone_is_no_hum(seed):
         assert (found is not None) == hummed
         if found is not None:
             assert found.structure.values(found.x)[-1]["amplitude"] == pytest.approx(size_N, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_hum_by_a_clock_that_wanders_is_found_once_the_clock_is_known(seed: int) -> None:
+    """Its stamps smear the line, and what is found of it is little."""
+    m = measurement(draw_case(seed, (), noise_kind="white", noise_N=0.004, rate_hz=400.0, own_clock=False))
+    t, rng = m.force_time_s, np.random.default_rng(seed)
+    u, (one, other) = t / t[-1], rng.uniform(0, 6, 2)
+    stamps = t + 0.03 * u * (np.sin(5 * np.pi * u + one) + np.sin(11 * np.pi * u + other))
+    hum = 0.003 * np.sin(2 * np.pi * 50.0 * t + 1.0)
+    m = replace(m, force_time_s=stamps, force_N=m.force_N + hum)
+
+    def left(felt_at: Callable[[Array], Array] | None) -> float:
+        told = prepare(m, np.ones(len(t), dtype=bool), felt_at)
+        assert felt_at is None or told.mains is not None
+        return float(np.std(hum[told.kept] - told.hum_N[told.at]) / np.std(hum))
+
+    assert left(None) > 0.8
+    assert left(lambda stamp_s: np.interp(stamp_s, stamps, t)) < 0.2
