@@ -29,6 +29,7 @@ AGAIN = 3  # samples of one value that a force on its way does not have
 GONE = 2  # samples of them by which it has: one alone may be late
 JUMP = 0.5  # of the way a force has gone while its channel stayed
 LEAST = 20.0  # times the least noise, that a stray is off by where there is none: moments of contact stand off too
+SMEARS_S = 1e-3  # by which stamps wander off an even clock: a twentieth of a wave of the mains
 MORE = 1.1  # times the power of the hum that the stamps tell
 STEPS, DEVIATIONS = 2.0, 8.0  # of the channel, and of its noise: so far a force has gone that shows none of it
 
@@ -112,7 +113,9 @@ def hum_asked_again(
     """Hum that is steady by the times at which the forces were felt, and not by their stamps, taken out as well."""
     last = path.fits[-1]
     plant = last.structure.cascade(last.x)
-    if not plant.shifts_time:
+    shift_s = plant.felt_at(m.force_time_s) - m.force_time_s
+    even = np.polyval(np.polyfit(m.force_time_s, shift_s, 1), m.force_time_s)
+    if np.std(shift_s - even) < SMEARS_S:
         return prepared, flags, search, path
     anew = prepare(m, flags.good, plant.felt_at)
     if anew.mains is None or np.sum(anew.hum_N**2) < MORE * np.sum(prepared.hum_N**2):

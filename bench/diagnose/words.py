@@ -91,7 +91,7 @@ def verdict(d: Diagnosis) -> str:
         told = "can be explained by" if unsure(d) else "is explained by"
         return f"What {'the bench adds' if in_air(d) else 'the model gets wrong'} {told} {named(d)}"
     if d.causes:
-        if not_sure(d):
+        if for_its_names(d):
             return (
                 f"Unexplained: {named(d)} would take {percent(1 - d.left)} of the error, but something else may as well"
             )
@@ -100,7 +100,7 @@ def verdict(d: Diagnosis) -> str:
     return "Unexplained: no known cause takes what is left"
 
 
-def not_sure(d: Diagnosis) -> bool:
+def for_its_names(d: Diagnosis) -> bool:
     """Whether what is unexplained is so for its names alone: little is left."""
     return d.verdict == "unexplained" and bool(d.causes) and d.left <= EXPLAINED
 
@@ -109,7 +109,7 @@ def not_known(d: Diagnosis) -> str:
     """What it means that a verdict is `unexplained`; empty where it is not."""
     if d.verdict != "unexplained":
         return ""
-    return NOT_SURE if not_sure(d) else NOT_KNOWN
+    return NOT_SURE if for_its_names(d) else NOT_KNOWN
 
 
 def unsure(d: Diagnosis) -> bool:
