@@ -69,7 +69,8 @@ def card(d: Diagnosis, heading: str = "", *, notes: bool = True, remark: str = "
         tiles.append(("after", force(d.held_out_after)))
     tiles.append(("noise floor", force(d.noise_floor)))
     if d.causes:
-        tiles.append(("of the error explained", words.percent(max(1.0 - d.left, 0.0))))
+        done = "explained" if d.verdict == "explained" else "taken"
+        tiles.append((f"of the error {done}", words.percent(max(1.0 - d.left, 0.0))))
     if d.flagged_fraction > 0:
         tiles.append(("of the samples flagged", words.percent(d.flagged_fraction)))
     top = heading or words.verdict(d)
