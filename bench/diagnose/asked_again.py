@@ -113,6 +113,8 @@ def hum_asked_again(
     """Hum that is steady by the times at which the forces were felt, and not by their stamps, taken out as well."""
     last = path.fits[-1]
     plant = last.structure.cascade(last.x)
+    if not plant.shifts_time:
+        return prepared, flags, search, path
     shift_s = plant.felt_at(m.force_time_s) - m.force_time_s
     even = np.polyval(np.polyfit(m.force_time_s, shift_s, 1), m.force_time_s)
     if np.std(shift_s - even) < SMEARS_S:

@@ -1,7 +1,8 @@
 """Sensor lag: a low-pass in the force path, as amplifiers and load cells have.
 
 In all forms `time_constant` is how far the output comes behind a ramp in the end, so that a change of form keeps its
-value. Each is exact for a force that is linear between samples, at any spacing.
+value. Each but `slewing`, which limits the rate from sample to sample, is exact for a force that is linear between
+samples, at any spacing.
 
 - `first_order`: 1/(1 + τs).
 - `partly`: 1 − σ + σ/(1 + τs/σ), a share σ of the force late and the rest at once: lag and lead of a divider with a
