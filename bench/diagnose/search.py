@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,7 @@ HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left b
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MUCH_LEFT, A_PART = 0.03, 0.05  # of what the belief leaves beyond the noise, that a first cause and all that follow it
 # leave; and what the lesser of two in its place takes
+GOOD_PART, OTHERS = 0.4, 2  # of what a first cause takes, that others take; so many are tried where it was none
 LESS = 0.1  # of what those leave, that two in their place leave
 MOST_CAUSES = 3
 SEED = 0
@@ -168,6 +170,22 @@ class Search(Shaping):
                 return again
             self.prepared = prepared  # which the path that was left may have whitened
         return None
+
+    def from_others(self, path: Path) -> Iterator[Path]:
+        """Paths that begin with those that stood behind a path's first cause and take a good part of what it takes."""
+        begun, base, prepared, ranked = time.process_time(), path.fits[0], self.prepared, path.rivals[0]
+        taken = base.chi2 - ranked[0].fit.chi2
+        others = (t for t in ranked if t.id != ranked[0].id and base.chi2 - t.fit.chi2 > GOOD_PART * taken)
+        for other in islice(others, OTHERS):
+            if time.process_time() - begun >= LONGEST_S:
+                break
+            self.prepared = prepared  # which the path before may have whitened
+            first = self._carried(other, ALL)
+            found = self.judge(base, first.fit, base)
+            if found.pays:
+                stood = [first, *(t for t in ranked if t.id != other.id)]
+                again = Path([base, first.fit], [stood], path.tried[:1], path.measures[:1], [found])
+                yield self._walked(again, time.process_time())
 
     def _two_leave_less(self, first: Trial, end: Fit) -> bool:
         """Whether a first cause and another, in the shapes that come first, leave less than a path's end."""

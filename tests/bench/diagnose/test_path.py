@@ -271,10 +271,10 @@ def test_where_no_test_sees_structure_a_little_over_the_noise_is_noise():
     ],
 )
 def test_a_further_cause_that_takes_next_to_nothing_under_an_unsure_name_goes(monkeypatch, excess, sure, goes):
-    diagnosis = importlib.import_module("bench.diagnose.diagnose")
-    monkeypatch.setattr(diagnosis, "sureness", lambda path, name, named: ([], sure, sure))
+    needed = importlib.import_module("bench.diagnose.needed")
+    monkeypatch.setattr(needed, "sureness", lambda path, name, named: ([], sure, sure))
     fits: list[Any] = [fit(0.0, *("backlash", "friction")[:k]) for k in range(3)]
-    assert diagnosis._doubtful(None, fits, excess, 0.0, 1.0, [0.0] * len(excess)) == goes
+    assert needed._doubtful(None, fits, excess, 0.0, 1.0, [0.0] * len(excess)) == goes
 
 
 @pytest.mark.parametrize(
@@ -287,10 +287,10 @@ def test_a_further_cause_that_takes_next_to_nothing_under_an_unsure_name_goes(mo
     ],
 )
 def test_beside_faults_of_the_channel_the_first_cause_is_a_further_one(monkeypatch, taken, apart, sure, goes):
-    diagnosis = importlib.import_module("bench.diagnose.diagnose")
-    monkeypatch.setattr(diagnosis, "sureness", lambda path, name, named: ([], sure, sure))
+    needed = importlib.import_module("bench.diagnose.needed")
+    monkeypatch.setattr(needed, "sureness", lambda path, name, named: ([], sure, sure))
     fits: list[Any] = [fit(0.0, *("backlash",)[:k]) for k in range(2)]
-    assert diagnosis._doubtful(None, fits, [taken, 0.0], apart, 1.0, [0.0, 0.0]) == goes
+    assert needed._doubtful(None, fits, [taken, 0.0], apart, 1.0, [0.0, 0.0]) == goes
 
 
 def test_a_cause_that_came_in_place_of_another_is_held_against_what_stood_beside_it_there():
@@ -395,3 +395,15 @@ def test_a_second_that_takes_next_to_nothing_makes_no_other_first():
         ("permanent_set", "missing_relaxation_mode"): {"backlash": 1050.0},
     }
     assert named(Told(ranks, None)) == ["stress_softening"]
+
+
+def test_paths_from_others_begin_with_those_that_take_a_good_part_of_what_the_first_took():
+    ranks: dict[tuple[str | float, ...], dict[str, float]] = {
+        (): {"friction": 20e3, "damage": 50e3, "backlash": 70e3, "adhesion": 150e3},
+        ("damage",): {"viscous_damping": 30e3},
+    }
+    search = Told(ranks, fit(30e3, "damage", "viscous_damping"))
+    path = search.path(fit(180e3))
+    assert [c.id for c in path.fits[-1].structure.causes] == ["friction"]
+    begun = [[c.id for c in other.fits[-1].structure.causes] for other in search.from_others(path)]
+    assert begun == [["damage", "viscous_damping"], ["backlash"]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -327,3 +328,23 @@ def test_a_wave_as_long_as_the_pad_is_deep_stands_beside_another_law(seed):
     said = diagnose(measurement(replace(c, position_mm=c.position_mm + wave)), Model.from_dict(c.believed))
     first = said.causes[0]
     assert "encoder_error" in {first.id, *(a.id for a in first.alternatives if not a.excluded)}
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3))])
+def test_where_all_that_was_found_goes_another_cause_may_begin(monkeypatch, seed):
+    """As if a lag had done harm to what was held out: a delay takes most of what it takes."""
+    module: Any = importlib.import_module("bench.diagnose.diagnose")
+    c = draw_case(seed, ("sensor_lag",), 1.5, protocol="rich", rate_hz=150.0, **QUIET)
+    needed, first = module.needed, []
+
+    def without_the_first(prepared: Any, path: Any, believed: Any) -> Any:
+        kept = needed(prepared, path, believed)
+        first.append(path.rivals[0][0].id)
+        if len(first) > 1:
+            return kept
+        return replace(kept, fits=kept.fits[:1], squares=kept.squares[:1], excess=kept.excess[:1])
+
+    monkeypatch.setattr(module, "needed", without_the_first)
+    result = diagnose(measurement(c), Model.from_dict(c.believed))
+    assert first[0] == "sensor_lag" and first[1] != "sensor_lag"
+    assert result.causes and result.causes[0].gain > 0.5
