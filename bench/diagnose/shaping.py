@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .candidates import CHANNEL, Signatures, alike, forms, starts
+from .candidates import CHANNEL, Signatures, alike, forms, narrowed, starts
 from .evidence import RIVAL, believable, unexplained
 from .numbers import Cause, cause_of
 from .path import Trial
@@ -108,7 +108,7 @@ class Shaping(Sieve):
         without = replace(beside.fit, structure=structure, x=x)
         best = now
         for form in beside.cause.effect.forms:
-            cause = cause_of(beside.cause.effect, form)
+            cause = cause_of(beside.cause.effect, narrowed(form, self.reach))
             amplitude = cause.amplitude
             names = {p.name for p in cause.fitted}
             if amplitude is None or amplitude.name not in one.keys() & other.keys() or not names > told_by_other:
