@@ -128,6 +128,8 @@ def _needless(
     scale = excess[0] + apart
     last = len(fits) - 2
     order = sorted(range(last + 1), key=lambda k: squares[k] - squares[k + 1])
+    if squares[-1] >= squares[0]:  # all together foretell nothing
+        return order[0]
     for k in order:
         taken, gain, left = squares[k] - squares[k + 1], excess[k] - excess[k + 1], excess[k]
         if k < last and gain <= FURTHER * scale and squares[k + 1] <= HARM * squares[k]:

@@ -42,6 +42,10 @@ class Measure:
     memory: float
 
 
+Stage = tuple[Trial, list[Trial], Measure]
+"""Where a cause came in: itself joined there, what stood beside it, by what χ² was judged."""
+
+
 @dataclass
 class Path:
     """Causes in the order found, with the fits along the way (`fits[0]`: none of them) and what stood beside each."""
@@ -52,12 +56,11 @@ class Path:
     """Ids, best first, with those that could not be believed where they stood."""
     measures: list[Measure] = field(default_factory=list)
     evidence: list[Evidence] = field(default_factory=list)
-    compared: dict[str, tuple[Trial, list[Trial], Measure]] = field(default_factory=dict)
+    compared: dict[str, Stage] = field(default_factory=dict)
     """By id, a cause beside its rivals where the path has ended: of those that came in amid causes that have gone."""
 
-    def stage_of(self, id_: str) -> tuple[Trial, list[Trial], Measure] | None:
-        """Where a cause came in, or was compared anew: (itself joined there, what stood beside it, by what χ² was
-        judged)."""
+    def stage_of(self, id_: str) -> Stage | None:
+        """Where a cause came in, or was compared anew."""
         if id_ in self.compared:
             return self.compared[id_]
         turns = zip(self.rivals, self.measures, strict=True)

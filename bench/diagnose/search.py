@@ -27,7 +27,7 @@ from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_s
 from .felt_errors import felt_errors, redrawn
 from .late_by_chance import late_by_chance_s
 from .numbers import shapes_of
-from .path import Measure, Path, Trial
+from .path import Measure, Path, Stage, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import families
@@ -47,6 +47,8 @@ MUCH_LEFT, A_PART = 0.03, 0.05  # of what the belief leaves beyond the noise, th
 # leave; and what the lesser of two in its place takes
 GOOD_PART, OTHERS = 0.4, 2  # of what a first cause takes, that others take; so many are tried where it was none
 LESS = 0.1  # of what those leave, that two in their place leave
+MISSED, SHAPED = 0.75, 2  # of what a further cause takes, that it took in the shape in which it came in; and how many
+# rivals are asked for their shapes then
 MOST_CAUSES = 3
 SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
@@ -283,19 +285,35 @@ class Search(Shaping):
         return [ranked[0], *others]
 
     def _compare(self, path: Path) -> None:
-        """Causes that came in amid others which have gone since, beside what stood near them there, where the path has
-        ended: the others' errors tell nothing of how sure their names are."""
+        """Causes that came in amid others which have gone since, or in another shape that missed much of what they
+        take, beside what stood near them there, where the path has ended: the others' errors, and those of a shape,
+        tell nothing of how sure their names are."""
         final = path.fits[-1]
+        own = len(path.fits[0].structure.causes)
         named = [c.id for c in final.structure.causes]
-        for index in range(len(path.fits[0].structure.causes), len(named)):
+        for index in range(own, len(named)):
             stage = path.stage_of(named[index])
-            if stage is None or {c.id for c in stage[0].fit.structure.causes} <= set(named):
+            if stage is None:
                 continue
+            amid = not {c.id for c in stage[0].fit.structure.causes} <= set(named)
             without = self._without(final, index)
+            if not amid and (index == own or not self._in_another_shape(final, index, stage, without)):
+                continue
             near = [i for i in dict.fromkeys(t.id for t in (*stage[1], *path.rivals[0])) if i not in named][:COMPARED]
-            own = self._trial(last(final, named[index]))
+            trial = self._trial(last(final, named[index]))
+            rivals = self.ranked(without, only=near)
+            if not amid:
+                rivals = sorted(
+                    (self._shaped(t) if k < SHAPED else t for k, t in enumerate(rivals)), key=lambda t: t.score
+                )
             measure = Measure(without.chi2, self.expected, self.effective, self.prepared.memory)
-            path.compared[own.id] = (own, self.ranked(without, only=near), measure)
+            path.compared[trial.id] = (trial, rivals, measure)
+
+    def _in_another_shape(self, final: Fit, index: int, stage: Stage, without: Fit) -> bool:
+        """Whether a cause of the final fit takes much more there, in another shape, than where it came in."""
+        trial, _, measure = stage
+        taken, then = without.chi2 - final.chi2, measure.before - trial.fit.chi2
+        return trial.cause.form.name != final.structure.causes[index].form.name and then < MISSED * taken
 
     def _added(self, path: Path, turn: _Turn) -> bool:
         """Whether the turn's first cause pays, or would with earlier ones exchanged: then it is at the path's end."""

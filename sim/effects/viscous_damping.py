@@ -28,6 +28,11 @@ on it, and not at an end that none was seen at.
   by modes w' = v − ν w, three a decade; `coefficient` is force over speed after 0.1 s of an even speed (R. L. Bagley,
   P. J. Torvik, A theoretical basis for the application of fractional calculus to viscoelasticity, J. Rheol. 27, 1983,
   201–210).
+- `filled`: coefficient · min(max((δ − begins)/(at_depth/5), 0), 1) v: a filling, or a cell of oil inside, that
+  is met at a depth.
+- `thixotropic`: coefficient · (stays + (1 − stays) λ) v, of a filling that gets thinner as it is moved and sets again:
+  λ' = (1 − λ)/sets − λ |v|/way, from 1 (J. Mewis, N. J. Wagner, Thixotropy, Adv. Colloid Interface Sci. 147–148, 2009,
+  214–227); `coefficient` is of one that has set.
 """
 
 from __future__ import annotations
@@ -165,6 +170,26 @@ def one_sided(dt: float, depth: float, state: State, p: State) -> float:
     return p[0] * (1.0 + p[1] if speed > 0.0 else 1.0 - p[1]) * speed
 
 
+@block
+def filled(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot from a depth on; p = (coefficient, begins, at_depth)."""
+    speed, state[1], state[2], state[3] = _speed(dt, depth, state[0], state[1], state[2], state[3])
+    state[0] = depth
+    return p[0] * min(max(5.0 * (depth - p[1]) / p[2], 0.0), 1.0) * speed
+
+
+@block
+def thixotropic(dt: float, depth: float, state: State, p: State) -> float:
+    """Dashpot that motion thins; p = (coefficient, stays, way, sets). State: as of `linear`, then 1 − λ."""
+    went = abs(max(depth, 0.0) - max(state[0], 0.0))
+    speed, state[1], state[2], state[3] = _speed(dt, depth, state[0], state[1], state[2], state[3])
+    state[0] = depth
+    steps = dt / p[3] + went / p[2]  # of an even speed within the step
+    if steps > 0.0:
+        state[4] += (went / p[2] / steps - state[4]) * -math.expm1(-steps)
+    return p[0] * (1.0 - (1.0 - p[1]) * state[4]) * speed
+
+
 _RESTING = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -281,6 +306,31 @@ EFFECT = Effect(
             sought=False,
             blocks={"contact": one_sided},
             state=_RESTING,
+        ),
+        Form(
+            name="filled",
+            what="from a depth on",
+            parameters=(
+                _coefficient("force per speed, a tenth of the depth reached behind `begins`"),
+                Parameter("begins", "mm", 0.0, 100.0, 0.4, "depth at which the filling is met", bend=True),
+                _AT_DEPTH,
+            ),
+            sought=False,
+            blocks={"contact": filled},
+            state=_RESTING,
+        ),
+        Form(
+            name="thixotropic",
+            what="less as it is moved, and as before after a rest",
+            parameters=(
+                _coefficient("force per speed of what has set"),
+                Parameter("stays", "1", 0.0, 0.95, 0.3, "share that no motion takes away", starts=(0.2,)),
+                Parameter("way", "mm", 0.05, 20.0, 0.7, "way over which it gets thinner", starts=(0.3, 1.0)),
+                Parameter("sets", "s", 0.1, 100.0, 2.0, "time within which it sets again", starts=(1.0, 4.0)),
+            ),
+            sought=False,
+            blocks={"contact": thixotropic},
+            state=(*_RESTING, 0.0),
         ),
     ),
 )

@@ -205,6 +205,31 @@ class TestWhatTheNinthShowed:
             force = simulate(soft, [pot], t, 0.5 * t)
             assert_allclose(force[10:], 0.01 * 0.5 * (t[10:] / 0.1) ** (1.0 - order), rtol=0.02)
 
+    def test_a_filling_that_is_met_at_a_depth(self) -> None:
+        """Nothing before it, and all of it a tenth of the depth later."""
+        t = 1e-3 * np.arange(201)
+        oil = active("viscous_damping", "filled", coefficient=0.01, begins=0.4, at_depth=0.5)
+        soft = Pad(Exponential(1e-9, 0.0), Relaxation(), unilateral=True)
+        force = simulate(soft, [oil], t, 5.0 * t)
+        assert_allclose(force[[50, 80]], 0.0, atol=1e-7)
+        assert_allclose(force[[90, 100, 150, 200]], [0.025, 0.05, 0.05, 0.05], rtol=1e-5)
+
+    def test_a_filling_that_motion_thins_and_rest_sets_again(self) -> None:
+        """Moved evenly λ goes to 1/(1 + sets |v|/way) as e^{−t(1/sets + |v|/way)}; after a rest of `sets` the rest of
+        it is less by 1/e."""
+        way, sets, v, stays = 0.5, 2.0, 1.0, 0.2
+        t = 1e-3 * np.arange(4001)
+        x = np.where(t < 1.0, v * t, np.where(t < 3.0, v, v * (4.0 - t)))
+        oil = active("viscous_damping", "thixotropic", coefficient=0.01, stays=stays, way=way, sets=sets)
+        soft = Pad(Exponential(1e-9, 0.0), Relaxation(), unilateral=False)
+        force = simulate(soft, [oil], t, x)
+        rate, end = 1.0 / sets + v / way, 1.0 / (1.0 + sets * v / way)
+        first = end + (1.0 - end) * np.exp(-rate * t[1:1001])
+        rested = 1.0 - (1.0 - first[-1]) * math.exp(-1.0)
+        assert_allclose(force[1:1001], 0.01 * (stays + (1.0 - stays) * first) * v, rtol=2e-3)
+        assert_allclose(force[1005:3000], 0.0, atol=1e-7)
+        assert force[3002] == pytest.approx(-0.01 * (stays + (1.0 - stays) * rested) * v, rel=0.01)
+
 
 class TestWhatGoesOnByItself:
     def test_a_part_that_friction_slows_down(self) -> None:
