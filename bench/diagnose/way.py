@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,24 +16,25 @@ if TYPE_CHECKING:
     from .data import Data
 
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich which come back
+AGAIN = 2  # times that a depth is held again, after another one, which do as well
 LEAST = 0.05  # of the travel: less is no way, nor another level
 MOVES = 0.2  # of the mean speed over all of the run
 TOLD_ONCE = 0.5  # how sure a name can be of what acts with the motion, where data are not rich
 
 
 def is_rich(data: Data) -> bool:
-    """Whether a measurement comes back, and holds several depths or passes over its depth several times."""
+    """Whether a measurement comes back, and holds several depths, or some again, or passes over it several times."""
     counted = data.weight > 0
     x = data.position_mm
     span = float(np.ptp(x[counted])) if counted.any() else 0.0
     if span <= 0.0 or _passes(x, LEAST * span) < 2:
         return False
-    levels: list[float] = []
-    for s in holds(data.time_s, x):
-        level = float(np.mean(x[s]))
-        if level > LEAST * span and all(abs(level - other) > LEAST * span for other in levels):
-            levels.append(level)
-    return len(levels) >= LEVELS or _passes(x, 0.5 * span) >= PASSES
+    held = [float(np.mean(x[s])) for s in holds(data.time_s, x)]
+    held = [level for level in held if level > LEAST * span]
+    held = [level for before, level in pairwise([np.inf, *held]) if abs(level - before) > LEAST * span]
+    first = [level for k, level in enumerate(held) if all(abs(level - other) > LEAST * span for other in held[:k])]
+    again = len(held) - len(first)
+    return len(first) >= LEVELS or again >= AGAIN or _passes(x, 0.5 * span) >= PASSES
 
 
 def on_the_way(data: Data) -> float:

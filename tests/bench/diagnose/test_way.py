@@ -37,6 +37,9 @@ def data(levels_mm: list[float], hold_s: float = 1.0) -> Data:
         ([2.0, 0.0, 2.0, 0.0, 2.0], True),
         ([0.5, 1.0, 1.5, 2.0], False),
         ([0.5, 1.0, 1.5, 2.0, 0.0], True),
+        ([0.7, 1.4, 2.0, 0.0], False),
+        ([0.7, 1.4, 2.0, 1.4, 0.7, 0.0], True),
+        ([0.7, 1.4, 2.0, 2.01, 1.99, 0.7, 0.0], False),
     ],
 )
 def test_several_depths_held_or_passes_make_data_rich_that_come_back(levels_mm, rich):
