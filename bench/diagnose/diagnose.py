@@ -24,7 +24,6 @@ from .channel_causes import by_themselves, channel_causes, joined
 from .data import Prepared, prepare
 from .evidence import SPEAKS, beyond_limit
 from .needed import Needed, needed
-from .noise import HARDLY_ANY
 from .noiseless import without_noise
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
@@ -44,6 +43,7 @@ Mask = NDArray[np.bool_]
 
 TOLD = 0.002  # of the noise power
 SETTLED_S = 0.15  # after a move
+NO_NOISE = 0.1  # of the noise power: what turns its sign with each sample is taken for some times as much noise
 RIVALS = 4  # models of the best single causes that are kept
 
 
@@ -198,7 +198,7 @@ def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:
     for s in holds(full.time_s, full.position_mm):
         still[s.start : s.stop] = full.time_s[s] > full.time_s[s.start] + SETTLED_S
     at = prepared.at[(full.weight[prepared.at] > 0) & still[prepared.at]]
-    if len(at) and np.mean(residual_N[at] ** 2) < HARDLY_ANY * prepared.noise.force_N**2:
+    if len(at) and np.mean(residual_N[at] ** 2) < NO_NOISE * prepared.noise.force_N**2:
         return None
     return swinging(full.time_s[at], residual_N[at], prepared.sample_s)
 

@@ -43,12 +43,11 @@ def find(time_s: Array, error_N: Array, sample_s: float) -> Swing | None:
     frequency = np.fft.rfftfreq(len(grid), sample_s)
     filled = len(error_N) / len(grid)  # where holds are short and far apart, neighbouring ordinates say the same
     first = max(SPARED, int(np.searchsorted(frequency, LOWEST_HZ)))
-    edges = _edges(first, len(power) - 1)
+    edges = _edges(first, len(power))
     if len(edges) < 5:
         return None
     count = np.diff(edges)
-    level = np.add.reduceat(power, edges[:-1])[: len(count)] / count if len(edges) else power
-    level[-1] = power[edges[-2] : edges[-1]].mean()
+    level = np.add.reduceat(power, edges[:-1]) / count
     above = np.zeros(len(level))
     # the least of three neighbouring bands together: of many single ones some lie low by chance
     kernel = np.ones(GROUND)

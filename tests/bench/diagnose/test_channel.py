@@ -380,6 +380,21 @@ def test_what_sways_at_a_frequency_of_its_own_is_seen_and_noise_is_not():
         assert found.share == pytest.approx(1.5**2 / (1.0 + 1.5**2), abs=0.12)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_turns_its_sign_from_sample_to_sample_is_seen(seed):
+    """Two gauges read in turn, one of which is out by some of the force: at half the rate, at which no hum is here."""
+    c = draw_case(seed, (), noise_kind="white", jitter="none", protocol="staircase", rate_hz=170.0)
+    m = measurement(c)
+    rows = np.arange(len(m.force_N))
+    out_by = 4.0 * c.truth.noise_floor_N / float(np.sqrt(np.mean(m.force_N**2)))
+    m = replace(m, force_N=m.force_N * (1.0 + out_by * (-1.0) ** rows))
+    result = diagnose(m, Model.from_dict(c.believed))
+    assert result.verdict == "unexplained" and not result.causes
+    told = [r for r in result.remainders if r.name == "swing" and r.passed]
+    assert told and "85 Hz" in told[0].sentence
+    assert result.noise_floor < 1.3 * c.truth.noise_floor_N
+
+
 def test_a_fault_of_the_channel_stands_where_what_it_takes_puts_it():
     def cause(id: str, gain: float) -> CauseFound:
         return CauseFound(id, "", {}, gain, 1.0, [], "", "")
