@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from bench.diagnose.data import prepare
-from bench.diagnose.diagnose import _with_hum, believed_structure
+from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.hum import Line, find
+from bench.diagnose.needed import _with_hum
 from bench.diagnose.noise import Part
 from bench.diagnose.refit import onto, refit
 from sim.model import Model

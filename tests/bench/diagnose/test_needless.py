@@ -14,7 +14,7 @@ import pytest
 from bench.diagnose.verdict import no_size
 from tests.bench.diagnose.small import fitted
 
-module = importlib.import_module("bench.diagnose.diagnose")
+module = importlib.import_module("bench.diagnose.needed")
 
 
 def needless(
