@@ -42,6 +42,7 @@ KNEES = ("soft",)  # forms that say more than that the greatest forces are at a 
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
 WORKERS = 2  # threads: the plant runs without Python's lock
 PLAIN = 20.0  # Δχ² for which a form of fewer numbers is preferred
+CRUMB_LEFT = 0.05  # of what one of them leaves, that another must take more at the full rate to stand before it
 LATER = 12.0  # Δχ² by which a later form of a family must be better than its first, as the less usual one
 LIMIT = 24.0  # Δχ² by which one with a number at its bound must be better: it is another cause's limit
 AS_A_WAVE = 0.99  # of the gain of a law drawn through points: so much a wave takes that is what was drawn
@@ -198,8 +199,10 @@ class Sieve:
         with ThreadPoolExecutor(WORKERS) as pool:
             whole = list(pool.map(lambda t: refit(full, t.fit.structure, t.fit.x, MORE, 1e-6), late))
         cost = [fit.chi2 + t.score - t.fit.chi2 for t, fit in zip(late, whole, strict=True)]
-        # what all of them leave tells nothing of which it is
-        if cost[0] - min(cost) <= BETTER * max(whole[0].chi2 / self.effective, 1.0):
+        # what all of them leave tells nothing of which it is; nor does a crumb of that, which other shapes may take
+        least = BETTER * max(whole[0].chi2 / self.effective, 1.0)
+        beyond = whole[0].chi2 - np.count_nonzero(full.weight > 0)
+        if cost[0] - min(cost) <= max(least, CRUMB_LEFT * beyond):
             return ranked
         first = late[int(np.argmin(cost))]
         return [first, *(t for t in ranked if t is not first)]

@@ -21,6 +21,8 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   it relaxes, in holds too (W. van Dijk, Practical fatigue characterization of bituminous mixes, Proc. Assoc. Asphalt
   Paving Technol. 44, 1975, 38–74). A stroke down to s, two thirds of `reach`, held there and after it for long, costs
   as much as elsewhere: among strokes of all depths those are about the mean.
+- `by_speed`: e^(−rate · ∫ (v/10 mm/s)^n ds) over the way loaded: quick strokes harm more, or less (n below 0), as the
+  rate of a crack goes with a power of the rate of loading (S. N. Zhurkov, Int. J. Fract. Mech. 1, 1965, 311–323).
 
 `rate` is what a mm of travel takes at first, of the stiffness; that of `weibull`, one over the travel that leaves 1/e.
 
@@ -40,6 +42,9 @@ from sim.jit import State, block, compiled
 
 _LAST, _TRAVEL = range(2)
 _MODE, _LOST = range(2)
+_BEFORE = 2
+_SPEED_MM_S, _SLOWEST_MM_S = 10.0, 0.01
+"""Speed at which `rate` of `by_speed` holds, and below which none is told from rest."""
 _LEAST = 0.02
 _MEAN_STROKE = 2.0 / 3.0
 """Of `reach`: what `rate` of `loss` is stated for."""
@@ -149,6 +154,17 @@ def threshold(dt: float, depth: float, state: State, p: State) -> float:
     return math.exp(-p[0] * state[_TRAVEL] / (1.0 - p[1]))
 
 
+@block
+def by_speed(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, exponent, dead_band). State: as elsewhere, and the depth before."""
+    before = state[_TRAVEL]
+    state[_LAST], went = loaded(depth, p[2], state[_LAST], 0.0)
+    speed = (max(depth, 0.0) - state[_BEFORE]) / dt if dt > 0.0 else 0.0
+    state[_BEFORE] = max(depth, 0.0)
+    state[_TRAVEL] = before + went * (max(speed, _SLOWEST_MM_S) / _SPEED_MM_S) ** p[1]
+    return max(_LEAST, math.exp(-p[0] * state[_TRAVEL]))
+
+
 _RATE = Parameter(
     "rate",
     "1/mm",
@@ -255,6 +271,18 @@ EFFECT = Effect(
             sought=False,
             blocks={"elastic": threshold},
             state=(0.0, 0.0),
+        ),
+        Form(
+            name="by_speed",
+            what="with loading travel, more or less of it as that is quick",
+            parameters=(
+                _RATE,
+                Parameter("exponent", "1", -1.5, 2.0, 0.4, "power of the speed", starts=(-0.4, 0.4)),
+                _DEAD_BAND,
+            ),
+            sought=False,
+            blocks={"elastic": by_speed},
+            state=(0.0, 0.0, 0.0),
         ),
     ),
 )

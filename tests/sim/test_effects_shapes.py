@@ -178,6 +178,25 @@ def test_a_delay_that_wanders() -> None:
     assert_allclose(np.trapezoid(late, share), 0.004, rtol=1e-6)
 
 
+def test_a_delay_that_changes_once() -> None:
+    stamps = 5.0 + np.linspace(0.0, 40.0, 401)
+    again = effect("force_delay").form("reconnected")
+    assert again.time_shift is not None
+    values = {"delay": 0.004, "changes": -0.25, "moved_at": 15.0, "within": 0.1}
+    late = stamps - again.time_shift(values, stamps)
+    assert_allclose(late[[0, 140, 150, 160, 400]], [0.004, 0.004, 0.0035, 0.003, 0.003], atol=1e-6)
+
+
+def test_damage_that_goes_with_the_speed_of_loading() -> None:
+    """A stroke of 1 mm at 40 mm/s costs twice as much as one at 10 mm/s, where it goes with the root of the speed."""
+    t = np.array([0.0, 0.1, 0.2, 0.225, 1.0])
+    x = np.array([0.0, 1.0, 0.0, 1.0, 1.0])
+    worn = active("damage", "by_speed", rate=0.1, exponent=0.5, dead_band=0.0)
+    pad = Pad(Exponential(1.0, 0.0), Relaxation(), unilateral=True)
+    force = simulate(pad, [worn], t, x)
+    assert_allclose(force[[1, 3, 4]], np.exp([-0.1, -0.3, -0.3]), rtol=1e-9)
+
+
 def test_a_clock_that_loses_its_reference() -> None:
     stamps = 5.0 + np.linspace(0.0, 40.0, 401)
     held = effect("clock_skew").form("held")

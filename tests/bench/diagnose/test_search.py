@@ -179,11 +179,12 @@ def test_a_curve_through_points_that_leaves_nothing_stands_against_its_rivals_in
         ((2200.0, 4590.0), (2220.0, 4570.0), 4500.0, "force_delay"),  # on the stand-in, and at full rate
         ((2200.0, 4570.0), (2220.0, 4590.0), 4500.0, "sensor_lag"),
         ((2200.0, 4590.0), (2220.0, 4570.0), 1000.0, "sensor_lag"),  # both leave so much that it tells nothing
+        ((9200.0, 9590.0), (9220.0, 9450.0), 9500.0, "sensor_lag"),  # it is a crumb of what both leave
         ((2200.0, 4590.0), (9220.0, 4570.0), 4500.0, "sensor_lag"),  # so far behind on the stand-in that nobody asks
     ],
 )
 def test_delay_and_lag_are_told_apart_where_each_sample_counts(monkeypatch, lag, delay, samples, first):
-    short, full = SimpleNamespace(size=4000), SimpleNamespace(size=30_000)
+    short, full = SimpleNamespace(size=4000), SimpleNamespace(size=30_000, weight=np.ones(4500))
 
     def trial(id: str, chi2: float) -> Any:
         return SimpleNamespace(id=id, fit=SimpleNamespace(chi2=chi2, structure=id, x=None), score=chi2 + 20.0)
