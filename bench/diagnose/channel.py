@@ -29,7 +29,8 @@ CEILING = 8  # samples in a row at the greatest force
 AT_TOP = 3  # samples at the greatest force, where digits are so many that no reading repeats another
 CALMED, AMID = 9, 0.3  # samples over which, and share of the usual change of slope below which, the noise has gone
 TOP, DISTINCT = 0.8, 3  # of the greatest force: where a ceiling that gives way still is; and values that it passes
-ELSEWHERE = 0.1  # of the share of calm samples near the greatest force: so many elsewhere mean no ceiling
+ELSEWHERE = 0.1  # of the share of calm samples near the greatest force, or of those at it that repeat each other: so
+# many elsewhere mean no ceiling
 FEW_BESIDE = 0.05  # of the samples at a ceiling that moves: so few others as high are at it too
 WIDEST_KNEE, USUAL_KNEE = 0.5, 0.1  # of a ceiling, that a knee is wide at the most, and where the noise does not tell
 AT_LAST = 0.75  # of a knee, where it is at its end
@@ -131,7 +132,7 @@ def _one_value(force: Array, outlier: Mask) -> Mask:
 
 def _ceiling(force: Array) -> tuple[Mask, float | None]:
     """Samples at the greatest (or least) value, where many in a row share it and nothing is beyond but a few strays; or
-    a few, in a channel in which no other two in a row are equal."""
+    a few, in a channel in which next to no other two in a row are equal."""
     mask, step = np.zeros(len(force), dtype=bool), resolution(force)
     first, length = runs(force)
     span = float(np.ptp(force))
@@ -154,13 +155,19 @@ def _ceiling(force: Array) -> tuple[Mask, float | None]:
             if length[told].max() >= longest and beyond.sum() <= FEW_BESIDE * int(length[told].sum()):
                 return np.repeat(told, length), sign * top
         held = np.repeat(at, length)
-        if int(others.max()) == 1 and not beyond.any() and _tops(sign * force, top, held):
+        repeats = int((others - 1).sum())
+        if (
+            others.max() < AT_TOP
+            and repeats <= ELSEWHERE * held.sum()
+            and not beyond.any()
+            and _tops(sign * force, top, held)
+        ):
             return held, sign * top
     return mask, None
 
 
 def _tops(force: Array, top: float, at: Mask) -> bool:
-    """Whether samples (m,) at the greatest force share one value in a channel in which no other two in a row do, with
+    """Whether samples (m,) at the greatest force share one value in a channel in which hardly others in a row do, with
     forces beside them that lead there: what sticks does so anywhere, and a stray stands alone."""
     if int(at.sum()) < AT_TOP or resolution(force) > 0.0:
         return False
