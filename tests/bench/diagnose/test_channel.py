@@ -154,6 +154,21 @@ def test_a_run_of_one_value_near_the_greatest_force_sticks_and_is_no_ceiling():
         assert found.stuck[top + 24 : top + 41].all()
 
 
+def test_a_ceiling_met_in_passing_is_one_though_a_reading_elsewhere_repeats_another():
+    """Two peaks cut off, of five samples each: too few in a row for a channel that sticks."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        t = 0.05 * np.arange(600)
+        force = 5.0 * np.exp(-(((t % 10.0 - 5.0) / 1.0) ** 2)) * np.array([1.0, 0.7, 1.0])[(t // 10.0).astype(int)]
+        force += 0.01 * rng.standard_normal(600)
+        above = force > 4.9
+        assert 4 < above.sum() < 16
+        force[above] = 4.9
+        force[301] = force[300]
+        found = faults(force)
+        assert np.array_equal(found.saturated, above) and not found.stuck[above].any()
+
+
 def test_a_coarse_channel_that_ends_softly_does_not_stick():
     """Where it ends it says one value for long, and for a while the next one: no noise is left to tell."""
     for seed in SEEDS:
