@@ -6,6 +6,8 @@
   of both have it.
 - `recovering`: at +limit for a time after the force has come back below it too: an amplifier that was driven into its
   rail takes a while to leave it (its overload recovery time).
+- `compressing`: beyond ±limit by the logarithm of what is more, limit + reach ln(1 + (|u| − limit)/reach): diodes that
+  protect an input, or an automatic gain.
 - `soft`: a knee, u/(1 + |u/limit|^sharpness)^(1/sharpness): an amplifier near its rails.
 
 Reference: H. K. Khalil, Nonlinear Systems, 3rd ed., Prentice Hall, 2002, section 1.2 (common nonlinearities); E. O.
@@ -62,6 +64,15 @@ def soft(dt: float, force: float, state: State, p: State) -> float:
     return float(end / (1.0 + ratio ** -p[1]) ** (1.0 / p[1]))
 
 
+@block
+def compressing(dt: float, force: float, state: State, p: State) -> float:
+    """The logarithm of what is beyond ±limit; p = (limit, reach)."""
+    more = abs(force) - p[0]
+    if more <= 0.0:
+        return force
+    return math.copysign(p[0] + p[1] * math.log1p(more / p[1]), force)
+
+
 _LIMIT = Parameter(
     "limit", "N", 1e-3, 1e5, 8.0, "greatest force reported", required=True, starts=(1.0, 2.0, 4.0, 8.0, 16.0)
 )
@@ -104,6 +115,16 @@ EFFECT = Effect(
                 Parameter("sharpness", "1", 1.0, 60.0, 8.0, "sharpness of the knee", starts=(3.0, 20.0)),
             ),
             blocks={"sampling": soft},
+        ),
+        Form(
+            name="compressing",
+            what="by the logarithm of what is more",
+            parameters=(
+                _LIMIT,
+                Parameter("reach", "N", 1e-4, 1e3, 0.1, "force over which it bends", starts=(0.02, 0.2)),
+            ),
+            sought=False,
+            blocks={"sampling": compressing},
         ),
     ),
 )
