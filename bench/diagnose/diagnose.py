@@ -65,9 +65,10 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     prepared, flags, search, path = asked_again(m, prepared, flags, search, Path([base]), first=True)
     base = path.fits[0]
     tell("looking for causes")
-    ended = _ended(m, search, flags, search.path(base), tell)
+    path = search.path(base)
+    ended = _ended(m, search, flags, path, tell)
     if ended.nothing_needed:  # what came first did harm to all that followed; what stood near it may not
-        others = (_ended(m, search, flags, other, tell) for other in search.from_others(ended.path))
+        others = (_ended(m, search, flags, other, tell) for other in search.from_others(path))
         ended = next((e for e in others if not e.nothing_needed), ended)
     return _concluded(m, believed, ended, begun)
 

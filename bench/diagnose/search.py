@@ -176,8 +176,9 @@ class Search(Shaping):
     def from_others(self, path: Path) -> Iterator[Path]:
         """Paths that begin with those that stood behind a path's first cause and take a good part of what it takes."""
         begun, base, prepared, ranked = time.process_time(), path.fits[0], self.prepared, path.rivals[0]
-        taken = base.chi2 - ranked[0].fit.chi2
-        others = (t for t in ranked if t.id != ranked[0].id and base.chi2 - t.fit.chi2 > GOOD_PART * taken)
+        before = path.measures[0].before
+        enough = GOOD_PART * (before - ranked[0].fit.chi2)
+        others = (t for t in ranked if t.id != ranked[0].id and before - t.fit.chi2 > enough)
         for other in islice(others, OTHERS):
             if time.process_time() - begun >= LONGEST_S:
                 break
