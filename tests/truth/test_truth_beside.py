@@ -48,3 +48,10 @@ def test_outliers_are_seen_beside_anything():
     seen = seen_beside(case)
     of_faults = float(np.sum((case.truth.fault_N / case.truth.noise.std) ** 2))
     assert seen["outliers"] == pytest.approx(of_faults, rel=0.2) and of_faults > ENOUGH
+
+
+def test_a_frame_that_yields_by_turns_stands_beside_a_force_that_runs_the_pad_by_itself():
+    """Each runs the plant anew, and neither may ask the other to do so for ever."""
+    shapes = {"frame_compliance": "beds_in", "viscous_damping": "tsuji"}
+    case = pair("frame_compliance", "viscous_damping", shapes=shapes, rate_hz=100.0)
+    assert np.isfinite(case.force_N).all() and case.truth.parameters.keys() == shapes.keys()
