@@ -20,6 +20,8 @@
 - `oiled`: a share of the mass is dragged along by oil and comes late by a first order, as a ring that turns in its
   housing (J. P. Den Hartog, Mechanical Vibrations, 4th ed., McGraw-Hill, 1956, section 3.3: Lanchester's damper). It is
   hung from a damper, by a spring that is next to none.
+- `compensated`: an accelerometer's signal takes `corrects` of it off, late by a first order: what is left of a slow move
+  is `mass`, and of a quick one at first mass/(1 − corrects) (Doebelin, chapter 5, on acceleration compensation).
 
 `mass` in kg, positions in mm: the force is mass/1000 · mm/s².
 
@@ -76,7 +78,7 @@ def rigid(dt: float, y: float, state: State, p: State) -> float:
     State: the last four knots, newest first: time since each, and position there; then that of the part that is hung.
     """
     hanging = 0.0
-    if p[6] > 0.0:
+    if p[6] != 0.0:
         if state[_STARTED] == 0.0:
             state[_HUNG] = y
         omega = 2.0 * math.pi * p[7]
@@ -162,6 +164,12 @@ def _oiled(values: Mapping[str, float]) -> tuple[float, ...]:
     # (2ζω s + ω²)/(s² + 2ζω s + ω²) is 1/(1 + τs) where 2ζω = 1/τ and ω is small
     ratio = 0.5 / (2.0 * math.pi * _LOOSE_HZ * values["time_constant"])
     return _packed({**values, "frequency": _LOOSE_HZ, "damping_ratio": ratio})
+
+
+def _compensated(values: Mapping[str, float]) -> tuple[float, ...]:
+    # m/(1 − c) (a − c a_late) is a share of −c/(1 − c) of m that comes late
+    corrects = values["corrects"]
+    return _oiled({**values, "share": -corrects / (1.0 - corrects)})
 
 
 EFFECT = Effect(
@@ -262,6 +270,21 @@ EFFECT = Effect(
             blocks={"probe": rigid},
             state=(0.0,) * 17,
             pack=_oiled,
+        ),
+        Form(
+            name="compensated",
+            what="as far as an accelerometer's signal has not taken it off in time",
+            parameters=(
+                _MASS,
+                Parameter("corrects", "1", 0.0, 0.95, 0.5, "share of the mass that is taken off, late"),
+                Parameter("time_constant", "s", 2e-4, 0.1, 0.004, "how late", starts=(0.002, 0.008)),
+                _WINDOW,
+                _LEAD,
+            ),
+            sought=False,
+            blocks={"probe": rigid},
+            state=(0.0,) * 17,
+            pack=_compensated,
         ),
     ),
 )

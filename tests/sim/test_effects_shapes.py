@@ -287,6 +287,17 @@ def test_a_mass_in_oil_comes_late() -> None:
     assert_allclose(force[late], wanted[late], rtol=0.02)
 
 
+def test_a_mass_that_is_compensated_late() -> None:
+    """A move at steady acceleration: m/(1 − c) is felt at first, and m in the end."""
+    t = np.arange(0.0, 0.2, 2e-4)
+    x = 0.5 * 200.0 * t**2
+    numbers = {"mass": 0.1, "corrects": 0.5, "time_constant": 0.02, "window": 1e-3, "lead": 0.0}
+    force = simulate(AIR, [active("inertia", "compensated", **numbers)], t, x)
+    wanted = 0.1 * 0.2 * (2.0 + np.expm1(-t / 0.02))
+    late = t > 0.005
+    assert_allclose(force[late], wanted[late], rtol=0.02)
+
+
 def test_a_zero_that_is_late_to_come_back() -> None:
     t = np.linspace(0.0, 40.0, 4001)
     force = np.where((t > 10.0) & (t <= 20.0), 4.0, 0.0)
