@@ -20,7 +20,7 @@
 - `oiled`: a share of the mass is dragged along by oil and comes late by a first order, as a ring that turns in its
   housing (J. P. Den Hartog, Mechanical Vibrations, 4th ed., McGraw-Hill, 1956, section 3.3: Lanchester's damper). It is
   hung from a damper, by a spring that is next to none.
-- `compensated`: an accelerometer's signal takes `corrects` of it off, late by a first order: what is left of a slow move
+- `compensated`: an accelerometer takes `corrects` of it off, late by a first order: what is left of a slow move
   is `mass`, and of a quick one at first mass/(1 − corrects) (Doebelin, chapter 5, on acceleration compensation).
 
 `mass` in kg, positions in mm: the force is mass/1000 · mm/s².
