@@ -349,3 +349,15 @@ def test_where_all_that_was_found_goes_another_cause_may_begin(monkeypatch, seed
     result = diagnose(measurement(c), Model.from_dict(c.believed))
     assert first[0] == "sensor_lag" and first[1] != "sensor_lag"
     assert result.causes and result.causes[0].gain > 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, pytest.param(1, marks=pytest.mark.long)])
+def test_a_further_cause_is_held_against_its_rivals_in_the_shape_that_it_has_in_the_end(seed):
+    """It came in as a dashpot that grows with the depth, which others nearly are; a filling met at a depth none is."""
+    told = {"viscous_damping": "inner_cell"}
+    sizes = {"backlash": 1.5, "viscous_damping": 0.8}
+    c = draw_case(seed, ("backlash", "viscous_damping"), sizes, told, protocol="rich", rate_hz=150.0, **QUIET)
+    found = {cause.id: cause for cause in diagnose(measurement(c), Model.from_dict(c.believed)).causes}
+    assert found.keys() == {"backlash", "viscous_damping"}
+    assert found["viscous_damping"].form == "filled" and found["viscous_damping"].confidence > 0.9
