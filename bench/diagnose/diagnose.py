@@ -19,7 +19,7 @@ from sim.pad import Pad
 
 from .asked_again import asked_again, hum_asked_again, with_pulses
 from .candidates import CHANNEL
-from .channel import Faults, faults, not_of_the_motion
+from .channel import FEW, Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, joined
 from .data import Prepared, prepare
 from .evidence import SPEAKS, beyond_limit
@@ -160,6 +160,8 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
     saturated = flags.saturated.copy()
     saturated[prepared.kept] |= beyond_limit(raw, whole[1])[at]
     flags = replace(flags, saturated=saturated)
+    if flags.outlier.sum() < FEW and all(c.id != "outliers" for c in causes):  # left out, but no fault of the channel
+        flags = replace(flags, outlier=np.zeros_like(flags.outlier))
     flagged = flags.flagged[prepared.kept]
     inside = m.counted()[prepared.kept]
     good = raw.weight[at] > 0

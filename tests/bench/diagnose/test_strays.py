@@ -3,12 +3,14 @@ independent simulator; rates over consecutive seeds."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bench.diagnose import Diagnosis, diagnose
 from bench.diagnose.asked_again import halted
-from bench.diagnose.channel import standing_off, strays
+from bench.diagnose.channel import resting, standing_off, strays
 from bench.recording.types import Measurement
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
@@ -123,3 +125,17 @@ def test_a_force_that_goes_on_a_sample_late_has_not_halted():
     stays[60:65] = stays[59]
     found = np.flatnonzero(halted(stays, soon, none, 0.005))
     assert found.size and set(found) <= set(range(60, 65))
+
+
+@pytest.mark.parametrize(("count", "flagged"), [(1, 0), (5, 5)])
+def test_one_stray_is_left_out_and_no_fault_of_the_channel(count, flagged):
+    for seed in SEEDS:
+        c = draw_case(seed, (), protocol="staircase", rate_hz=150.0, jitter="none", noise_kind="white")
+        m, rng = measurement(c), np.random.default_rng(seed)
+        off = rng.choice(np.flatnonzero(resting(m)), count, replace=False)
+        force_N = m.force_N.copy()
+        force_N[off] += 60.0 * c.truth.noise_floor_N
+        result = diagnose(replace(m, force_N=force_N), Model.from_dict(c.believed))
+        assert np.array_equal(np.flatnonzero(result.flags["outliers"]), np.sort(off)[:flagged])
+        assert [x.id for x in result.causes] == ["outliers"] * (flagged > 0)
+        assert result.rmse_after < 1.2 * c.truth.noise_floor_N
