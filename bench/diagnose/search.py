@@ -174,7 +174,8 @@ class Search(Shaping):
         return None
 
     def from_others(self, path: Path) -> Iterator[Path]:
-        """Paths that begin with those that stood behind a path's first cause and take a good part of what it takes."""
+        """Paths that begin with those that stood behind a path's first cause and take a good part of what it takes, all
+        within the time that one has."""
         begun, base, prepared, ranked = time.process_time(), path.fits[0], self.prepared, path.rivals[0]
         before = path.measures[0].before
         enough = GOOD_PART * (before - ranked[0].fit.chi2)
@@ -188,7 +189,7 @@ class Search(Shaping):
             if found.pays:
                 stood = [first, *(t for t in ranked if t.id != other.id)]
                 again = Path([base, first.fit], [stood], path.tried[:1], path.measures[:1], [found])
-                yield self._walked(again, time.process_time())
+                yield self._walked(again, begun)
 
     def _two_leave_less(self, first: Trial, end: Fit) -> bool:
         """Whether a first cause and another, in the shapes that come first, leave less than a path's end."""
