@@ -129,6 +129,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         lower, upper = max(lower, 2.0 / reach.span_s), min(upper, 0.9 / reach.sample_s)
     elif p.name == "window":  # corners of the motion are rebuilt between samples
         default = 0.1 * reach.sample_s
+    elif p.name == "lasts":  # half of the time in which the load comes and goes once
+        default = reach.span_s * reach.force_N / reach.changes_N
     elif p.unit == "s" and p.logarithmic:
         upper = min(upper, 3.0 * reach.span_s)
     elif p.name == "period":

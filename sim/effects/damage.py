@@ -19,8 +19,8 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   stroke (Paris), the faster the longer it is (k below 0).
 - `loss`: e^(−rate · s ∫ ν (u − z)² dt), z' = ν (u − z), u = (δ/s)^n, ν = 1/time_constant: by what a pad dissipates as
   it relaxes, in holds too (W. van Dijk, Practical fatigue characterization of bituminous mixes, Proc. Assoc. Asphalt
-  Paving Technol. 44, 1975, 38–74). A stroke down to s, two thirds of `reach`, held there and after it for long, costs
-  as much as elsewhere: among strokes of all depths those are about the mean.
+  Paving Technol. 44, 1975, 38–74), over 1 − e^(−ν `lasts`): a stroke down to s, two thirds of `reach`, held for `lasts`
+  and followed by a long rest costs as much as elsewhere; among strokes of all depths those are about the mean.
 - `by_speed`: e^(−rate · ∫ (v/10 mm/s)^n ds) over the way loaded: quick strokes harm more, or less (n below 0), as the
   rate of a crack goes with a power of the rate of loading (S. N. Zhurkov, Int. J. Fract. Mech. 1, 1965, 311–323).
 
@@ -135,15 +135,15 @@ def fatigue(dt: float, depth: float, state: State, p: State) -> float:
 
 @block
 def loss(dt: float, depth: float, state: State, p: State) -> float:
-    """Factor on F^e; p = (rate, exponent, time_constant, reach); state: what the relaxing mode remembers, ∫ ν (u − z)²
-    dt."""
+    """Factor on F^e; p = (rate, exponent, time_constant, reach, lasts); state: what the relaxing mode remembers, ∫ ν
+    (u − z)² dt."""
     stroke = _MEAN_STROKE * p[3]
     u = (depth / stroke) ** p[1] if depth > 0.0 else 0.0
     fades = math.exp(-dt / p[2])
     behind = u - state[_MODE]
     state[_MODE] = u - behind * fades
     state[_LOST] += 0.5 * behind * behind * (1.0 - fades * fades)
-    return math.exp(-p[0] * stroke * state[_LOST])
+    return math.exp(p[0] * stroke * state[_LOST] / math.expm1(-p[4] / p[2]))
 
 
 @block
@@ -254,6 +254,9 @@ EFFECT = Effect(
                 replace(_EXPONENT, lower=0.3, what="power of depth with which the load goes"),
                 Parameter("time_constant", "s", 1e-3, 1e3, 1.0, "within which it relaxes", starts=(0.1, 1.0, 10.0)),
                 _REACH,
+                Parameter(
+                    "lasts", "s", 1e-3, 1e9, 1e9, "time for which a stroke is held that costs `rate`", fixed=True
+                ),
             ),
             sought=False,
             blocks={"elastic": loss},

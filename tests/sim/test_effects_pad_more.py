@@ -269,6 +269,11 @@ def test_what_relaxes_is_lost_in_holds_too() -> None:
     force = simulate(LINEAR, [active("damage", "loss", **numbers)], t, x)
     assert_allclose(force[t == 7.0], 2.0 * K * math.exp(-0.1), rtol=1e-4)  # half of 2 mm · 0.1/mm
     assert_allclose(force[-1], 2.0 * K * math.exp(-0.2), rtol=5e-3)
+    # held for 2 s by a mode of 4 s, and at rest for long: again as a mm of travel is said to cost
+    t2 = np.concatenate([np.arange(0.0, 2.0, 0.002), 2.0 + np.arange(0.0, 40.0, 0.01)])
+    slow = active("damage", "loss", **(numbers | {"time_constant": 4.0, "lasts": 2.0}))
+    x2 = np.where((t2 < 2.0) | (t2 > 41.98), 2.0, -0.1)
+    assert_allclose(simulate(LINEAR, [slow], t2, x2)[-1], 2.0 * K * math.exp(-0.2), rtol=2e-2)
     quick = active("damage", "loss", **(numbers | {"time_constant": 500.0}))
     assert_allclose(simulate(LINEAR, [quick], t, x)[t == 7.0], 2.0 * K, rtol=5e-3)
 
