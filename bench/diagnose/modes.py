@@ -23,6 +23,7 @@ DEALT = 0.3  # e-folds that believed shares and rates may be off, where nothing 
 TIMES = 60
 RATES = 6  # from which a spectrum is begun
 STEPS = 10  # of the fit from there
+APART = 0.1  # e-folds of a number, by which two ways to deal it out are two
 
 
 def as_believed(short: Data, fit: Fit) -> Fit | None:
@@ -45,30 +46,39 @@ def as_believed(short: Data, fit: Fit) -> Fit | None:
 
     def dealt(x: Array) -> tuple[Relaxation, dict[str, float]]:
         numbers = np.exp(x[: 2 * order]).tolist()
-        return Relaxation(tuple(numbers[:order]), tuple(numbers[order:])), _told(cause, names, x[2 * order :])
+        return Relaxation(tuple(numbers[:order]), tuple(numbers[order:])), _told(cause, names, x[2 * order : -1])
 
     def error(x: Array) -> Array:
         relaxation, told = dealt(x)
         if sum(relaxation.shares) + told["share"] >= 1.0:
-            return np.full(TIMES + 2 * order, 1e3)
-        off = _relaxed(amend(replace(pad, relaxation=relaxation), told).relaxation, times) - wanted
-        return np.concatenate([off / SEEN, (x[: 2 * order] - centre) / DEALT])
+            return np.full(TIMES + 2 * order + 1, 1e3)
+        left = _relaxed(amend(replace(pad, relaxation=relaxation), told).relaxation, times)
+        # what relaxes before any sample sees it is a stiffer pad
+        off = np.exp(x[-1]) * left - wanted
+        return np.concatenate([off / SEEN, (x[: 2 * order] - centre) / DEALT, x[-1:] / DEALT])
 
     tried = []
     room = max(0.05, 0.9 * (1.0 - sum(own.shares)))
     for rate in (values[index]["rate"], *(1.0 / times[:: TIMES // RATES]).tolist()):
         begun = values[index] | {"rate": rate, "share": min(values[index]["share"], room)}
-        start = np.concatenate([centre, np.log([max(begun[name], 1e-6) for name in names])])
+        start = np.concatenate([centre, np.log([max(begun[name], 1e-6) for name in names]), [0.0]])
         if np.isfinite(start).all() and error(start).max() < 1e3:
             tried.append(least_squares(error, start, max_nfev=60))
     if not tried:
         return None
-    relaxation, told = dealt(min(tried, key=lambda one: float(one.cost)).x)
-    numbers = replace(structure.pad, pad=replace(pad, relaxation=relaxation))
-    values[index] = {**values[index], **told}
-    x = np.clip(structure.x(numbers.x(), values, fit.of_run), structure.lower, structure.upper)
-    x[: end - 2 * order] = fit.x[: end - 2 * order]
-    return refit(short, structure, x, STEPS, 1e-8)
+    best = min(tried, key=lambda one: float(one.cost))
+    # nearly as near in another valley: the data tell which
+    others = [one for one in tried if np.max(np.abs(one.x - best.x)) > APART]
+    chosen = [best, *sorted(others, key=lambda one: float(one.cost))[:1]]
+    fits = []
+    for one in chosen:
+        relaxation, told = dealt(one.x)
+        numbers = replace(structure.pad, pad=replace(pad, relaxation=relaxation))
+        own_values = [*values[:index], {**values[index], **told}, *values[index + 1 :]]
+        x = np.clip(structure.x(numbers.x(), own_values, fit.of_run), structure.lower, structure.upper)
+        x[: end - 2 * order] = fit.x[: end - 2 * order]
+        fits.append(refit(short, structure, x, STEPS, 1e-8))
+    return min(fits, key=lambda f: f.chi2)
 
 
 def _told(cause: Cause, names: list[str], x: Array) -> dict[str, float]:
