@@ -44,6 +44,7 @@ Mask = NDArray[np.bool_]
 TOLD = 0.002  # of the noise power
 SETTLED_S = 0.15  # after a move
 NO_NOISE = 0.1  # of the noise power: what turns its sign with each sample is taken for some times as much noise
+A_PART = 0.05  # of the error beyond the noise, that a search which began anew must take
 RIVALS = 4  # models of the best single causes that are kept
 
 
@@ -69,7 +70,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     ended = _ended(m, search, flags, path, tell)
     if ended.nothing_needed:  # what came first did harm to all that followed; what stood near it may not
         others = (_ended(m, search, flags, other, tell) for other in search.from_others(path))
-        ended = next((e for e in others if not e.nothing_needed), ended)
+        ended = next((e for e in others if e.takes_a_part), ended)
     return _concluded(m, believed, ended, begun)
 
 
@@ -87,6 +88,11 @@ class _Ended:
     def nothing_needed(self) -> bool:
         """Whether there were causes and none is left."""
         return len(self.path.fits) > 1 and len(self.needed.fits) == 1
+
+    @property
+    def takes_a_part(self) -> bool:
+        """Whether what is needed takes some of the error of what was held out."""
+        return self.needed.excess[-1] < (1.0 - A_PART) * self.needed.excess[0]
 
 
 def _ended(m: Measurement, search: Search, flags: Faults, path: Path, tell: Callable[[str], None]) -> _Ended:

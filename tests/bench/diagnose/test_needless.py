@@ -50,6 +50,10 @@ def test_of_two_that_hide_each_other_neither_is_needless(monkeypatch):
     assert needless(monkeypatch, [4.0, 3.99, 1.0], [3.9]) is None
 
 
+def test_of_two_that_together_foretell_less_than_none_does_one_goes_though_each_helps_the_other(monkeypatch):
+    assert needless(monkeypatch, [4.0, 4.3, 4.1], [4.5]) == 0
+
+
 def test_one_that_the_others_have_made_needless_goes(monkeypatch):
     assert needless(monkeypatch, [4.0, 4.1, 1.0, 1.01], [3.9, 3.0]) == 2
     assert needless(monkeypatch, [4.0, 4.1, 1.0], [1.0]) == 0
@@ -199,3 +203,11 @@ def test_a_size_that_is_hardly_told_is_nothing_only_where_the_force_does_not_fee
     unsure = replace(fit, structure=structure, x=x, spread=1e6 * np.eye(len(x)))
     assert no_size(prepared.full, unsure, 0) == (gap_mm < 1e-6)
     assert no_size(prepared.full, replace(unsure, spread=1e-12 * np.eye(len(x))), 0) is False
+
+
+@pytest.mark.parametrize(("left", "takes"), [(0.97, False), (0.9, True)])
+def test_a_search_that_began_anew_must_take_a_part_of_the_error(left, takes):
+    ended = importlib.import_module("bench.diagnose.diagnose")._Ended
+    none: Any = None
+    needed: Any = SimpleNamespace(excess=[1.0, left])
+    assert ended(none, none, none, none, needed).takes_a_part == takes
