@@ -30,7 +30,7 @@ from .path import Path
 from .refit import force_at
 from .remains import remains
 from .result import Alternative, Diagnosis
-from .search import Search
+from .search import A_PART, Search
 from .swing import Swing
 from .swing import find as swinging
 from .units import doubts
@@ -44,7 +44,6 @@ Mask = NDArray[np.bool_]
 TOLD = 0.002  # of the noise power
 SETTLED_S = 0.15  # after a move
 NO_NOISE = 0.1  # of the noise power: what turns its sign with each sample is taken for some times as much noise
-A_PART = 0.05  # of the error beyond the noise, that a search which began anew must take
 RIVALS = 4  # models of the best single causes that are kept
 
 
@@ -62,8 +61,7 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     search = Search(prepared, structure, tell, ["saturation"] if flags.saturated.any() else [])
     tell("refitting what is believed")
     base = search.base(_pads(m, believed, structure, flags.good))
-    prepared = search.prepared
-    prepared, flags, search, path = asked_again(m, prepared, flags, search, Path([base]), first=True)
+    _, flags, search, path = asked_again(m, search.prepared, flags, search, Path([base]), first=True)
     base = path.fits[0]
     tell("looking for causes")
     path = search.path(base)
@@ -91,7 +89,7 @@ class _Ended:
 
     @property
     def takes_a_part(self) -> bool:
-        """Whether what is needed takes some of the error of what was held out."""
+        """Whether what is needed takes as much of the error of what was held out as a search that began anew must."""
         return self.needed.excess[-1] < (1.0 - A_PART) * self.needed.excess[0]
 
 

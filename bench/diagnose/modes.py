@@ -66,19 +66,19 @@ def as_believed(short: Data, fit: Fit) -> Fit | None:
             tried.append(least_squares(error, start, max_nfev=60))
     if not tried:
         return None
-    best = min(tried, key=lambda one: float(one.cost))
-    # nearly as near in another valley: the data tell which
-    others = [one for one in tried if np.max(np.abs(one.x - best.x)) > APART]
-    chosen = [best, *sorted(others, key=lambda one: float(one.cost))[:1]]
-    fits = []
-    for one in chosen:
-        relaxation, told = dealt(one.x)
+
+    def carried(x: Array) -> Fit:
+        relaxation, told = dealt(x)
         numbers = replace(structure.pad, pad=replace(pad, relaxation=relaxation))
-        own_values = [*values[:index], {**values[index], **told}, *values[index + 1 :]]
-        x = np.clip(structure.x(numbers.x(), own_values, fit.of_run), structure.lower, structure.upper)
+        values[index] = {**values[index], **told}
+        x = np.clip(structure.x(numbers.x(), values, fit.of_run), structure.lower, structure.upper)
         x[: end - 2 * order] = fit.x[: end - 2 * order]
-        fits.append(refit(short, structure, x, STEPS, 1e-8))
-    return min(fits, key=lambda f: f.chi2)
+        return refit(short, structure, x, STEPS, 1e-8)
+
+    nearest, *others = (one.x for one in sorted(tried, key=lambda one: float(one.cost)))
+    # another valley may be nearly as near: the data tell which
+    apart = [x for x in others if np.max(np.abs(x - nearest)) > APART]
+    return min((carried(x) for x in (nearest, *apart[:1])), key=lambda f: f.chi2)
 
 
 def _told(cause: Cause, names: list[str], x: Array) -> dict[str, float]:

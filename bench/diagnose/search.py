@@ -27,7 +27,7 @@ from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_s
 from .felt_errors import felt_errors, redrawn
 from .late_by_chance import late_by_chance_s
 from .numbers import shapes_of
-from .path import Measure, Path, Stage, Trial
+from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import families
@@ -44,7 +44,7 @@ A_SHAPE = 0.1  # of what is left beyond the noise, that another shape of a cause
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MUCH_LEFT, A_PART = 0.03, 0.05  # of what the belief leaves beyond the noise, that a first cause and all that follow it
-# leave; and what the lesser of two in its place takes
+# leave; and what the lesser of two in its place takes, or of what was held out all that begins with another
 GOOD_PART, OTHERS = 0.4, 2  # of what a first cause takes, that others take; so many are tried where it was none
 LESS = 0.1  # of what those leave, that two in their place leave
 MISSED, SHAPED = 0.75, 2  # of what a further cause takes, that it took in the shape in which it came in; and how many
@@ -162,9 +162,7 @@ class Search(Shaping):
             first = self._carried(near, ALL)
             if not self._two_leave_less(first, end):
                 continue
-            stood = [first, *(t for t in path.rivals[0] if t.id != near.id)]
-            found = self.judge(base, first.fit, base)
-            again = Path([base, first.fit], [stood], path.tried[:1], path.measures[:1], [found])
+            again = self._begun_with(path, first)
             again = self._walked(again, time.process_time())  # there is hope, and it has its own time
             two = len(again.fits) == 3 and again.evidence[1].share > A_PART
             beyond = again.fits[-1].chi2 - self.expected
@@ -176,20 +174,23 @@ class Search(Shaping):
     def from_others(self, path: Path) -> Iterator[Path]:
         """Paths that begin with those that stood behind a path's first cause and take a good part of what it takes, all
         within the time that one has."""
-        begun, base, prepared, ranked = time.process_time(), path.fits[0], self.prepared, path.rivals[0]
-        before = path.measures[0].before
+        begun, prepared, ranked, before = time.process_time(), self.prepared, path.rivals[0], path.measures[0].before
         enough = GOOD_PART * (before - ranked[0].fit.chi2)
         others = (t for t in ranked if t.id != ranked[0].id and before - t.fit.chi2 > enough)
         for other in islice(others, OTHERS):
             if time.process_time() - begun >= LONGEST_S:
                 break
             self.prepared = prepared  # which the path before may have whitened
-            first = self._carried(other, ALL)
-            found = self.judge(base, first.fit, base)
-            if found.pays:
-                stood = [first, *(t for t in ranked if t.id != other.id)]
-                again = Path([base, first.fit], [stood], path.tried[:1], path.measures[:1], [found])
+            again = self._begun_with(path, self._carried(other, ALL))
+            if again.evidence[0].pays:
                 yield self._walked(again, begun)
+
+    def _begun_with(self, path: Path, first: Trial) -> Path:
+        """A path that begins with one of those that stood beside another's first cause."""
+        base = path.fits[0]
+        stood = [first, *(t for t in path.rivals[0] if t.id != first.id)]
+        found = self.judge(base, first.fit, base)
+        return Path([base, first.fit], [stood], path.tried[:1], path.measures[:1], [found])
 
     def _two_leave_less(self, first: Trial, end: Fit) -> bool:
         """Whether a first cause and another, in the shapes that come first, leave less than a path's end."""
@@ -297,25 +298,24 @@ class Search(Shaping):
             stage = path.stage_of(named[index])
             if stage is None:
                 continue
-            amid = not {c.id for c in stage[0].fit.structure.causes} <= set(named)
-            without = self._without(final, index)
-            if not amid and (index == own or not self._in_another_shape(final, index, stage, without)):
+            came, beside, then = stage
+            amid = not {c.id for c in came.fit.structure.causes} <= set(named)
+            other = index > own and came.cause.form.name != final.structure.causes[index].form.name
+            if not (amid or other):
                 continue
-            near = [i for i in dict.fromkeys(t.id for t in (*stage[1], *path.rivals[0])) if i not in named][:COMPARED]
-            trial = self._trial(last(final, named[index]))
+            without = self._without(final, index)
+            missed = then.before - came.fit.chi2 < MISSED * (without.chi2 - final.chi2)
+            if not (amid or missed):
+                continue
+            near = [i for i in dict.fromkeys(t.id for t in (*beside, *path.rivals[0])) if i not in named][:COMPARED]
+            now = self._trial(last(final, named[index]))
             rivals = self.ranked(without, only=near)
             if not amid:
                 rivals = sorted(
                     (self._shaped(t) if k < SHAPED else t for k, t in enumerate(rivals)), key=lambda t: t.score
                 )
             measure = Measure(without.chi2, self.expected, self.effective, self.prepared.memory)
-            path.compared[trial.id] = (trial, rivals, measure)
-
-    def _in_another_shape(self, final: Fit, index: int, stage: Stage, without: Fit) -> bool:
-        """Whether a cause of the final fit takes much more there, in another shape, than where it came in."""
-        trial, _, measure = stage
-        taken, then = without.chi2 - final.chi2, measure.before - trial.fit.chi2
-        return trial.cause.form.name != final.structure.causes[index].form.name and then < MISSED * taken
+            path.compared[now.id] = (now, rivals, measure)
 
     def _added(self, path: Path, turn: _Turn) -> bool:
         """Whether the turn's first cause pays, or would with earlier ones exchanged: then it is at the path's end."""

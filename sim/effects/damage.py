@@ -157,11 +157,10 @@ def threshold(dt: float, depth: float, state: State, p: State) -> float:
 @block
 def by_speed(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, exponent, dead_band). State: as elsewhere, and the depth before."""
-    before = state[_TRAVEL]
     state[_LAST], went = loaded(depth, p[2], state[_LAST], 0.0)
     speed = (max(depth, 0.0) - state[_BEFORE]) / dt if dt > 0.0 else 0.0
     state[_BEFORE] = max(depth, 0.0)
-    state[_TRAVEL] = before + went * (max(speed, _SLOWEST_MM_S) / _SPEED_MM_S) ** p[1]
+    state[_TRAVEL] += went * (max(speed, _SLOWEST_MM_S) / _SPEED_MM_S) ** p[1]
     return max(_LEAST, math.exp(-p[0] * state[_TRAVEL]))
 
 
