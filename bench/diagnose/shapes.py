@@ -38,7 +38,7 @@ WORKERS = 2
 
 @dataclass(frozen=True)
 class Member:
-    """A shape of a family, fitted in the place `index` of a fit's causes."""
+    """A shape of a family, fitted in the place `index` of a fit's causes; −1: the fit without any."""
 
     fit: Fit
     index: int
@@ -54,6 +54,17 @@ class Member:
         s = self.fit.structure
         spread = np.diag(self.fit.covariance())[s.of_cause(self.index)]
         return dict(zip([p.name for p in s.causes[self.index].fitted], spread.tolist(), strict=True))
+
+    @property
+    def at_its_end(self) -> int:
+        """How many of its numbers are at a bound and yet do something there: at 0, or left out, one does nothing."""
+        if self.index < 0:
+            return 0
+        s, at = self.fit.structure, self.fit.structure.of_cause(self.index)
+        x, moves = self.fit.x[at], np.diag(self.fit.matrix)[at] > 0.0
+        ended = moves & ((x <= s.lower[at] + EDGE) | (x >= s.upper[at] - EDGE))
+        neutral = [self.values[p.name] in (0.0, p.default) for p in s.causes[self.index].fitted]
+        return int(np.count_nonzero(ended & ~np.array(neutral, dtype=bool)))
 
 
 def stand_in(short: Data, fit: Fit) -> tuple[Fit, list[int]]:
@@ -85,12 +96,13 @@ def families(short: Data, lead: Fit, indices: Sequence[int]) -> list[list[Member
 def scores(short: Data, members: Sequence[Member]) -> Array:
     """χ² of each with what its numbers cost (G. Schwarz, Ann. Statist. 6, 1978, 461–464).
 
-    What the best of them leaves beyond the noise counts as noise, that of the colour too: no shape is exact.
+    What the best of them leaves beyond the noise counts as noise, that of the colour too: no shape is exact. A number
+    at the end of what the data can tell was chosen like any other, and costs as much.
     """
     entries = float(np.count_nonzero(short.weight > 0))
     scale = max(min(m.fit.chi2 / max(entries - m.fit.free, 1.0) for m in members), 1.0)
     cost = float(np.log(max(short.weight.sum() / scale**2, 20.0)))
-    return np.array([m.fit.chi2 / scale + cost * m.fit.free for m in members])
+    return np.array([m.fit.chi2 / scale + cost * (m.fit.free + m.at_its_end) for m in members])
 
 
 def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:

@@ -116,6 +116,22 @@ def test_the_best_shape_stays() -> None:
     assert reshaped(p.short, fit) is fit
 
 
+def test_a_number_at_the_end_of_what_is_told_costs_as_much_as_another_and_one_that_does_nothing_none() -> None:
+    _, p, fit = fitted("stress_softening", "exponential", "exponential")
+    structure, at = fit.structure, fit.structure.of_cause(0)
+    share, depth = at.start, at.start + 1
+
+    def moved(position: int, to: float) -> shapes.Member:
+        x = fit.x.copy()
+        x[position] = to
+        return shapes.Member(replace(fit, x=x), 0)
+
+    same, deep, none = shapes.scores(
+        p.short, [shapes.Member(fit, 0), moved(depth, structure.upper[depth]), moved(share, structure.lower[share])]
+    )
+    assert deep == same and none < same - 3.0  # the logarithm of twenty entries, at the least
+
+
 def test_shapes_that_serve_as_well_widen_what_is_stated() -> None:
     """A small effect in noise: the shape cannot be told, and the numbers of the shapes differ."""
     c, p, fit = fitted("force_drift", "turns", "linear", 0.3)
