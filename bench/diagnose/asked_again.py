@@ -74,8 +74,8 @@ def _left(m: Measurement, prepared: Prepared, fit: Fit) -> tuple[Array, Array]:
     it is where the noise is loud, and more where it is not."""
     full, at = prepared.full, prepared.at
     errors, modelled = np.full(len(m.force_N), np.nan), m.force_N.copy()
-    modelled[prepared.kept] = force_at(full, fit.structure, fit.x)[at]
-    noise_N = prepared.noise.at(modelled[prepared.kept])
+    force_N = force_at(full, fit.structure, fit.x)
+    modelled[prepared.kept], noise_N = force_N[at], prepared.noise_N(force_N)[at]
     surely = prepared.noise.force_N / np.hypot(noise_N, prepared.felt.total_N[at])
     errors[prepared.kept] = surely * (full.force_N[at] - modelled[prepared.kept])
     return errors, modelled

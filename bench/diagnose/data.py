@@ -20,6 +20,7 @@ from sim.jit import compiled
 
 from .coarse import rounded
 from .hum import Line, find
+from .louder import louder_in_motion
 from .noise import Colour, ForceNoise, force_noise, hold_errors, least_N
 from .whiten import Whitening, whitening
 
@@ -144,6 +145,8 @@ class Prepared:
     good: Mask
     """Of those, which are no channel faults."""
     noise: ForceNoise
+    louder: Array
+    """By how much it is louder (full.size,) than at rest."""
     hum: Line | None
     """What hums, and has been taken out of the force."""
     hum_N: Array
@@ -180,6 +183,10 @@ class Prepared:
     def colour(self) -> Colour:
         """Of the force's noise."""
         return self.noise.colour
+
+    def noise_N(self, force_N: Array) -> Array:
+        """Standard deviations of the force's noise where a model has these forces (full.size,), N."""
+        return np.asarray(self.noise.at(force_N) * self.louder)
 
     @property
     def memory(self) -> float:
@@ -280,9 +287,10 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         taken_N = line.force_N(felt_s - begins_s, m.force_N)
         m = replace(m, force_N=m.force_N - taken_N)
     motion = felt(m.position_time_s, m.position_mm)
-    noise = force_noise(m, good)
+    noise, louder = force_noise(m, good), louder_in_motion(m, good)
     least = max(rounded(m.force_N[good], resolution(m.force_N)), least_N(m))
-    sigma_force = max(noise.force_N, least)
+    noise_N = np.maximum(noise.at(m.force_N) * louder, least)
+    sigma_force = max(float(np.sqrt(np.mean(noise_N[good] ** 2))), least)
     grid, where = union(motion.time_s, m.force_time_s)
     position = motion.at(grid)
     stiffness = stiffness_along(m)
@@ -293,7 +301,7 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
     # a hold or a planned move is off as a whole; elsewhere windows of neighbours share what they share
     whole = np.where(stretch[where] > 0, 1.0, np.sqrt(0.5))
     shared[where] = whole * through
-    sigma[where] = np.hypot(np.maximum(noise.at(m.force_N), least), np.sqrt(1.0 - whole**2) * through)
+    sigma[where] = np.hypot(noise_N, np.sqrt(1.0 - whole**2) * through)
     stretch = np.unique(stretch, return_inverse=True)[1]
     weight[where] = counted
     force[where], hum[where] = m.force_N, np.where(counted, taken_N, 0.0)
@@ -313,7 +321,8 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         at=where,
         kept=inside,
         good=good,
-        noise=replace(noise, force_N=sigma_force),
+        noise=replace(noise, force_N=sigma_force, air_N=max(noise.air_N, least)),
+        louder=np.interp(grid, m.force_time_s, louder),
         hum=line,
         hum_N=hum,
         position_noise_mm=max(motion.noise_mm, 1.05 * resolution(m.position_mm)),

@@ -62,7 +62,7 @@ def felt_errors(prepared: Prepared, fit: Fit, errors_mm: Array) -> FeltErrors:
     # nor of each sample's own: what a fit meets well it shall go on meeting
     square = data.weight * (left - common) ** 2
     counted = np.maximum(uniform_filter1d(data.weight, TOGETHER), 1e-12)
-    beyond_N2 = uniform_filter1d(square, TOGETHER) / counted - prepared.noise.at(modelled) ** 2
+    beyond_N2 = uniform_filter1d(square, TOGETHER) / counted - prepared.noise_N(modelled) ** 2
     own_N2 = np.minimum(own_N2, np.maximum(beyond_N2, 0.0))
     at = prepared.at[data.weight[prepared.at] > 0.0]
     leapt_N = leaps(modelled[at], data.force_N[at], prepared.without_felt_N[at])

@@ -12,6 +12,7 @@ for a while, swings or wanders in the holds is none, and is told from it by that
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,7 @@ LEAST = 12
 MEMORY_S = 0.15  # correlation time beyond which it is no noise, but structure
 SLOWER_S, SMOOTHER_S = (0.6, 2.5), (0.1, 0.5)  # memory of what wanders, and of what wanders without kinks
 SWINGS_HZ, SWINGS_S = np.geomspace(1.0, 16.0, 9), 4.0  # what swings, and how long it keeps its phase
+FLICKER_S, OCTAVES = (0.64, 0.32, 0.16, 0.08, 0.04), 4.0  # longest memories of noise of 1/f; from pole to pole
 REACH_S = 0.6  # of the longest stretches that are compared
 LEVELS = 12
 WINDOW_S, SHORTEST = 0.4, 24  # in which noise is compared with noise; samples
@@ -47,32 +49,29 @@ COLOURED, PAYS = 3.0, 20.0  # twice the log-likelihood by which colour, and stru
 
 @dataclass(frozen=True)
 class Colour:
-    """ρ_0 = 1, ρ_k = share · φ^k between force samples k apart."""
+    """ρ_0 = 1, ρ_k = Σ share · φ^k between force samples k apart, of poles (share, φ)."""
 
-    share: float = 0.0
-    phi: float = 0.0
+    poles: tuple[tuple[float, float], ...] = ()
 
     @property
     def memory(self) -> float:
         """Samples that say the same as one, of a slow direction: 1 + 2 Σ ρ."""
-        return 1.0 + 2.0 * self.share * self.phi / (1.0 - self.phi)
+        return 1.0 + 2.0 * sum(share * phi / (1.0 - phi) for share, phi in self.poles)
 
 
 @dataclass(frozen=True)
 class ForceNoise:
-    """`force_N`: standard deviation of the force alone, RMS over the data; `from_holds`: else from motion. Where
-    `share` is not 0, it is `air_N` in air, and `share` of the force adds to that in squares."""
+    """Of the force alone: `air_N` in air and at rest, and `share` of the force adds to that in squares; `force_N`: RMS
+    over the data. `from_holds`: else from motion."""
 
-    force_N: float
+    air_N: float
     colour: Colour
     from_holds: bool
-    air_N: float = 0.0
     share: float = 0.0
+    force_N: float = 0.0
 
     def at(self, force_N: Array) -> Array:
         """Standard deviations at forces (n,), N."""
-        if self.share == 0.0:
-            return np.full(len(force_N), self.force_N)
         return np.asarray(np.hypot(self.air_N, self.share * force_N))
 
 
@@ -102,6 +101,11 @@ def hold_errors(m: Measurement, good: Mask) -> list[Part]:
 
 def force_noise(m: Measurement, good: Mask) -> ForceNoise:
     """Of the force samples (m,) that are `good`, about smooth curves through the holds."""
+    noise = _of_holds(m, good)
+    return replace(noise, force_N=float(np.sqrt(np.mean(noise.at(m.force_N[good]) ** 2))))
+
+
+def _of_holds(m: Measurement, good: Mask) -> ForceNoise:
     parts, sample_s = hold_errors(m, good), float(np.median(np.diff(m.force_time_s)))
     if sum(len(e) for _, e, _ in parts) < 40:
         return ForceNoise(_from_motion(m.force_N[good]), Colour(), False)
@@ -110,8 +114,7 @@ def force_noise(m: Measurement, good: Mask) -> ForceNoise:
     if share == 0.0:
         return _matched([(e, Q) for _, e, Q in parts], sample_s)
     in_air = _matched([(e / np.hypot(1.0, share * y), Q) for (_, e, Q), y in zip(parts, curves, strict=True)], sample_s)
-    noise = replace(in_air, air_N=in_air.force_N, share=share * in_air.force_N)
-    return replace(noise, force_N=float(np.sqrt(np.mean(noise.at(m.force_N[good]) ** 2))))
+    return replace(in_air, share=share * in_air.air_N)
 
 
 def _about_curve(t: Array, y: Array) -> tuple[Array, Array]:
@@ -263,44 +266,84 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     if len(found) < 3 or not found.all():  # a channel without noise stands still in air
         return ForceNoise(float(np.sqrt(max(found[0] / plain[0], 1e-300))), Colour(), True)
     weight = 1.0 / (1.0 / counts[counts >= 3.0] + STEADY**2)
-    memories = [0.0, *np.geomspace(0.5 * sample_s, max(MEMORY_S, sample_s), 20).tolist()]
-    noises = [[plain] if memory == 0.0 else [plain, tail(memory)] for memory in memories]
-    best = _best(memories, noises, [], found, weight)
-    if best[0] > PAYS:
+    memories = np.geomspace(0.5 * sample_s, max(MEMORY_S, sample_s), 20).tolist()
+    kinds = [_Kind((), [plain]), *(_Kind(_pole(memory, sample_s), [plain, tail(memory)]) for memory in memories)]
+    best = _best(kinds, [], found, weight)
+    if best.deviance > PAYS:
         widths = [w for w in WIDTHS if w * sample_s < MEMORY_S]
-        averages = [[plain, mean(_expected(parts, levels, _Averaged(w)))] for w in widths]
         # of what fades, the memory that adds up to as many samples: near enough to make it white
-        fades_s = [sample_s / float(np.log((w + 1) / (w - 1))) for w in widths]
-        averaged = _best(fades_s, averages, [], found, weight)
-        if averaged[0] + PAYS < best[0]:
-            best, memories, noises = averaged, [0.0, *fades_s], [[plain], *averages]
-    if best[0] > PAYS:
+        averages = [
+            _Kind(
+                _pole(sample_s / float(np.log((w + 1) / (w - 1))), sample_s),
+                [plain, mean(_expected(parts, levels, _Averaged(w)))],
+            )
+            for w in widths
+        ]
+        averaged = _best(averages, [], found, weight)
+        if averaged.deviance + PAYS < best.deviance:
+            best, kinds = averaged, [kinds[0], *averages]
+    if best.deviance > PAYS:
         beside = [tail(memory) for memory in SLOWER_S]
         # (1 + x) e^−x
         beside += [tail(memory) + (tail(1.05 * memory) - tail(0.95 * memory)) / 0.1 for memory in SMOOTHER_S]
         beside += [tail(SWINGS_S, f) for f in SWINGS_HZ if f * sample_s < 0.1]
         # no structure has just these forms: colour must take a good part of what they leave
-        other = _best(memories[:1], noises[:1], beside, found, weight)
-        coloured = _best(memories, noises, beside, found, weight)
-        other = coloured if coloured[0] * MISFIT + COLOURED < other[0] else other
-        best = other if other[0] + PAYS < best[0] else best
-    _, memory, own, carried = best
-    sigma2 = max(own + carried, 1e-300)
-    share = carried / sigma2
-    phi = float(np.exp(-sample_s / memory)) if memory else 0.0
-    return ForceNoise(float(np.sqrt(sigma2)), Colour(share, phi) if share > 0.02 else Colour(), True)
+        other = _best(kinds[:1], beside, found, weight)
+        coloured = _best(kinds, beside, found, weight)
+        other = coloured if coloured.deviance * MISFIT + COLOURED < other.deviance else other
+        flicker = _best([_flicker(longest, sample_s, plain, tail) for longest in FLICKER_S], [], found, weight)
+        if flicker.deviance < min(best.deviance, other.deviance + PAYS):
+            best = flicker
+        elif other.deviance + PAYS < best.deviance:
+            best = other
+    sigma2 = max(best.own + best.carried, 1e-300)
+    share = best.carried / sigma2
+    poles = tuple((share * part, phi) for part, phi in best.poles)
+    return ForceNoise(float(np.sqrt(sigma2)), Colour(poles if share > 0.02 else ()), True)
 
 
-def _best(
-    memories: list[float], noises: list[list[Array]], beside: list[Array], found: Array, weight: Array
-) -> tuple[float, float, float, float]:
-    """(deviance, memory in s, white and coloured power) of the noise that does best with what is beside."""
-    out = (np.inf, 0.0, 0.0, 0.0)
-    for memory, noise in zip(memories, noises, strict=True):
-        amounts, deviance = likeliest(np.stack([*noise, *beside], axis=1), found, weight)
-        deviance += COLOURED * (len(noise) - 1)
-        if deviance < out[0]:
-            out = (deviance, memory, float(amounts[0]), float(amounts[1]) if len(noise) > 1 else 0.0)
+Poles = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """Noise of a colour: its poles; by level, the squares of white noise (levels,) and of unit noise of the poles."""
+
+    poles: Poles
+    columns: list[Array]
+
+
+@dataclass(frozen=True)
+class _Told:
+    """How well a kind does, and its white and coloured power."""
+
+    deviance: float
+    poles: Poles
+    own: float
+    carried: float
+
+
+def _pole(memory_s: float, sample_s: float) -> Poles:
+    return ((1.0, float(np.exp(-sample_s / memory_s))),)
+
+
+def _flicker(longest_s: float, sample_s: float, plain: Array, tail: Callable[[float], Array]) -> _Kind:
+    """Noise of as much power in each octave, as amplifiers and bridges fed by direct current have: poles that are
+    evenly spread, from the longest memory to that of a sample (A. van der Ziel, Physica 16, 1950, 359–372)."""
+    count = max(int(np.log(2.0 * longest_s / sample_s) / np.log(OCTAVES)) + 1, 1)
+    memories = [longest_s / OCTAVES**k for k in range(count)]
+    poles = tuple((1.0 / count, float(np.exp(-sample_s / memory))) for memory in memories)
+    return _Kind(poles, [plain, np.mean([tail(memory) for memory in memories], axis=0)])
+
+
+def _best(kinds: list[_Kind], beside: list[Array], found: Array, weight: Array) -> _Told:
+    """The noise that does best with what is beside."""
+    out = _Told(np.inf, (), 0.0, 0.0)
+    for kind in kinds:
+        amounts, deviance = likeliest(np.stack([*kind.columns, *beside], axis=1), found, weight)
+        deviance += COLOURED * (len(kind.columns) - 1)
+        if deviance < out.deviance:
+            out = _Told(deviance, kind.poles, float(amounts[0]), float(amounts[1]) if kind.poles else 0.0)
     return out
 
 

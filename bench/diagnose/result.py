@@ -112,7 +112,7 @@ class Diagnosis:
     next_protocol: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
-    """What makes the data's units or sign doubtful; in the file's notes too."""
+    """What makes the data's units or sign doubtful, or is odd about their noise; in the file's notes too."""
     remainders: list[Remainder] = field(default_factory=list)
     name: str = ""
     seen_once: bool = False
