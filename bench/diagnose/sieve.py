@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 FEW, MORE, ALL = 3, 7, 40  # steps of the three rounds
 STARTS, SECOND, THIRD, WORTH = 4, 8, 4, 18  # starts of an id; ids in the second, the third, and the first round
+BY_CHANCE = 0.4  # of a step between samples, by which the time at which forces were felt scatters
 LATE_TOO = 0.99  # of what the best takes: what makes the force late too and takes as much
 BETTER = 10.0  # Δχ², times what the best leaves over what noise does: for less no cause is exchanged
 COMPARED = 5  # rivals of a cause that is compared anew
@@ -193,6 +194,8 @@ class Sieve:
         sample counts: means over blocks smear what a delay keeps and a lag does not."""
         enough = LATE_TOO * (before.chi2 - ranked[0].fit.chi2)
         late = [t for t in ranked[: 1 + COMPARED] if t.id in LATE and before.chi2 - t.fit.chi2 > enough]
+        if self.prepared.felt.late_s > BY_CHANCE * self.prepared.sample_s:  # what scatters has waited: no filter does
+            return sorted(ranked, key=lambda t: t not in late or t.id != "force_delay")
         if ranked[0].id not in LATE or len(late) < 2 or self.short.size == self.prepared.full.size:
             return ranked
         full = self.prepared.full

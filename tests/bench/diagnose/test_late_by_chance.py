@@ -3,6 +3,8 @@ independent simulator."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.late_by_chance import late_by_chance_s
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.refit import refit
+from bench.diagnose.sieve import Sieve
 from sim.effects import effect
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
@@ -64,3 +67,18 @@ def test_a_delay_that_scatters_is_explained_with_its_noise() -> None:
         near = delay is not None and abs(delay.value / case.truth.parameters["force_delay"]["delay"] - 1.0) < 0.1
         said.append(d.verdict == "explained" and len(names) == 1 and (near or "force_delay" in beside))
     assert sum(said) >= 2, said
+
+
+@pytest.mark.parametrize(("late_s", "delay_chi2", "first"), [
+    (0.002, 104.0, "force_delay"),  # four fifths of a step between samples: it has waited
+    (0.0005, 104.0, "sensor_lag"),  # as stamps scatter
+    (0.002, 120.0, "sensor_lag"),  # it takes less than what smooths
+])  # fmt: skip
+def test_what_scatters_has_waited_and_no_filter_does(late_s: float, delay_chi2: float, first: str) -> None:
+    size = SimpleNamespace(size=100)
+    sieve = SimpleNamespace(
+        short=size, prepared=SimpleNamespace(felt=SimpleNamespace(late_s=late_s), sample_s=0.0025, full=size)
+    )
+    costs = {"sensor_lag": 100.0, "force_delay": delay_chi2, "clock_skew": 110.0}
+    ranked = [SimpleNamespace(id=id_, fit=SimpleNamespace(chi2=chi2)) for id_, chi2 in costs.items()]
+    assert Sieve.late_first(sieve, SimpleNamespace(chi2=1000.0), ranked)[0].id == first
