@@ -43,7 +43,7 @@ PLACES = (
 REPORT, PLAY, FRAME, PROBE, DEPTH, LAW, ELASTIC, RATE, CONTACT, GAP, SENSOR, SAMPLING = range(12)
 
 # program: sizes and offsets, where each place's blocks start, then (address, state, parameters) a block
-MODES, UNILATERAL, FILM, INNER, INNER_SIZE, TRIAL, SCRATCH, RELAX, CACHE, STARTS = range(10)
+MODES, UNILATERAL, FILM, ONCE, INNER, INNER_SIZE, TRIAL, SCRATCH, RELAX, CACHE, STARTS = range(11)
 ROWS = STARTS + len(PLACES) + 1
 
 # state: what the solver keeps …
@@ -259,7 +259,7 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
         if plain:
             Fe = -A / B if B > 0.0 else 0.0
         F = pull
-    elif F >= 0.0:
+    elif F >= 0.0 and program[ONCE] == 0:
         state[pad + PULLED] = 0.0
     for i in range(r):
         w = state[pad + W + i]

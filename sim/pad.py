@@ -32,6 +32,8 @@ class Pad:
     unilateral: bool
     film_Ns: float = 0.0
     """Impulse of tension that a film bears before a `unilateral` pad lets go."""
+    film_once: bool = False
+    """Whether that is the impulse it bears in all: a bond that is broken does not heal."""
 
 
 class Cascade:

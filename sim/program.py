@@ -79,6 +79,7 @@ def lay_out(pad: Pad, effects: Sequence[Active]) -> Layout:
     program[k.MODES] = r
     program[k.UNILATERAL] = pad.unilateral
     program[k.FILM] = film_at
+    program[k.ONCE] = pad.film_once
     program[k.INNER] = inner_at
     program[k.INNER_SIZE] = len(inner)
     program[k.TRIAL] = trial_at

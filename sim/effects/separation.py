@@ -5,6 +5,9 @@
 - `film`: a film of grease or water between pad and probe bears tension first, until it has grown too thick: by Stefan's
   law F dt goes with d(1/h²), so that a film of any first thickness well below its last bears an impulse and no more. It
   closes when pad and probe are pressed together again.
+- `breaking`: a bond bears an impulse of tension in all, from lift to lift, and is broken for good once that is used up:
+  an adhesive under loads that come back gathers damage until it parts (W. V. Mars, A. Fatemi, A literature survey on
+  fatigue analysis approaches for rubber, Int. J. Fatigue 24, 2002, 949–961).
 
 Reference: T. C. T. Ting, The contact stresses between a rigid indenter and a viscoelastic half-space, J. Appl. Mech.
 33, 1966, 845–854 (receding contact on a surface that recovers); J. Stefan, Versuche über die scheinbare Adhäsion,
@@ -31,6 +34,15 @@ def _lets_go_late(pad: Pad, values: Mapping[str, float]) -> Pad:
     return pad if pad.unilateral else replace(pad, unilateral=True, film_Ns=values["impulse"])
 
 
+def _breaks(pad: Pad, values: Mapping[str, float]) -> Pad:
+    return pad if pad.unilateral else replace(_lets_go_late(pad, values), film_once=True)
+
+
+def _impulse(what: str, most: int) -> Parameter:
+    """Begun at each quarter of a decade: an impulse that no lift reaches changes nothing with a little more or less."""
+    return Parameter("impulse", "N*s", 1e-6, 1e4, 0.02, what, starts=tuple(10.0 ** (k / 4) for k in range(-16, most)))
+
+
 EFFECT = Effect(
     id="separation",
     what="The pad lets go where the model believes it bonded.",
@@ -42,18 +54,14 @@ EFFECT = Effect(
         Form(
             name="film",
             what="a film bears an impulse of tension before it lets go",
-            parameters=(
-                Parameter(
-                    "impulse",
-                    "N*s",
-                    1e-6,
-                    1e3,
-                    0.02,
-                    "tension over time that parts pad and probe",
-                    starts=tuple(10.0 ** (k / 4) for k in range(-16, 5)),
-                ),
-            ),
+            parameters=(_impulse("tension over time that parts pad and probe", 5),),
             amend=_lets_go_late,
+        ),
+        Form(
+            name="breaking",
+            what="a bond bears an impulse of tension in all, and is broken for good",
+            parameters=(_impulse("tension over time, of all lifts, that breaks the bond", 10),),
+            amend=_breaks,
         ),
     ),
 )

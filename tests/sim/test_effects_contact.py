@@ -66,6 +66,20 @@ class TestSeparationAndAdhesion:
         let_go = simulate(pad, [active("separation", "film", impulse=1e-6), *others], t, x)
         assert_allclose(let_go, unilateral, atol=2e-3)
 
+    def test_a_bond_that_has_borne_its_impulse_is_broken_for_good(self) -> None:
+        pad = replace(LINEAR, relaxation=Relaxation((0.5,), (2.0,)), unilateral=False)
+        cycle = np.concatenate([ramp(1.0, 201)[:-1], np.zeros(200)])
+        x, t = np.tile(cycle, 3), np.arange(3 * cycle.size) * 2e-3
+        bonded = simulate(pad, [], t, x)
+        pulls = [2e-3 * float(pull.sum()) for pull in np.split(np.maximum(-bonded, 0.0), 3)]
+        impulse = pulls[0] + 0.5 * pulls[1]  # it holds through the first lift, and breaks in the second
+        force = simulate(pad, [active("separation", "breaking", impulse=impulse)], t, x)
+        tears = int(np.flatnonzero((force == 0.0) & (bonded < -1e-3))[0])
+        assert 600 < tears < 1200
+        assert_allclose(force[: tears - 1], bonded[: tears - 1], atol=1e-9)
+        assert 2e-3 * float(np.maximum(-force, 0.0).sum()) == pytest.approx(impulse, rel=0.02)
+        assert force[tears:].min() == 0.0 and force[1200:].max() == pytest.approx(force[600:1200].max(), rel=0.05)
+
     @pytest.mark.parametrize(
         ("form", "shape"),
         [
