@@ -10,6 +10,7 @@ from bench.errors import InputError, Refused
 from sim.effects import Active
 from sim.elastic import ElasticLaw
 from sim.model import Model
+from sim.pad import Pad
 from sim.relaxation import Relaxation
 
 DEFAULT_RATE_HZ = 1000.0
@@ -45,14 +46,14 @@ def real_time_pad(model: Model, *, pad_only: bool = False) -> RealTimePad:
     Effects that are only another pad (another law, one more mode, contact that lets go) are taken in. Any other
     effect has no form in an export: raises `Refused`, or leaves it out where `pad_only` says so.
     """
-    others = tuple(_called(active) for active in model.cascade.effects if not _is_pad(active))
+    pad = model.cascade.pad
+    others = tuple(_called(active) for active in model.cascade.effects if not _is_pad(active, pad))
     if others and not pad_only:
         raise Refused(
             f"the model has {_listed(others)}, which {'has' if len(others) == 1 else 'have'} no form in an export: "
             "it holds elastic response, relaxation and contact\n"
             "  export the pad without with --pad-only, or simulate the whole with `padbench simulate`"
         )
-    pad = model.cascade.pad
     return RealTimePad(pad.law, pad.relaxation, pad.unilateral, others)
 
 
@@ -77,8 +78,10 @@ def version() -> str:
     return version("padbench")
 
 
-def _is_pad(active: Active) -> bool:
+def _is_pad(active: Active, pad: Pad) -> bool:
     form = active.form
+    if active.effect.id == "separation" and pad.film_Ns > 0.0:  # a film that bears tension has no form there
+        return False
     return form.amend is not None and not form.blocks and form.time_shift is None
 
 

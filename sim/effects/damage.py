@@ -21,6 +21,9 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   it relaxes, in holds too (W. van Dijk, Practical fatigue characterization of bituminous mixes, Proc. Assoc. Asphalt
   Paving Technol. 44, 1975, 38–74), over 1 − e^(−ν `lasts`): a stroke down to s, two thirds of `reach`, held for `lasts`
   and followed by a long rest costs as much as elsewhere; among strokes of all depths those are about the mean.
+- `creep`: e^(−rate · s ∫ (δ/s)^n dt/`lasts`): by the time under load, at whatever speed that came (L. M. Kachanov,
+  Rupture time under creep conditions, 1958; translated in Int. J. Fract. 97, 1999, xi–xviii). A stroke down to s, as of
+  `loss`, held for `lasts` costs as much as elsewhere.
 - `by_speed`: e^(−rate · ∫ (v/10 mm/s)^n ds) over the way loaded: quick strokes harm more, or less (n below 0), as the
   rate of a crack goes with a power of the rate of loading (S. N. Zhurkov, Int. J. Fract. Mech. 1, 1965, 311–323).
 
@@ -147,6 +150,16 @@ def loss(dt: float, depth: float, state: State, p: State) -> float:
 
 
 @block
+def creep(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e; p = (rate, exponent, reach, lasts); state: depth before, ∫ (δ/s)^n dt."""
+    stroke = _MEAN_STROKE * p[2]
+    here = max(depth, 0.0)
+    state[1] += dt * (0.5 * (here + state[0]) / stroke) ** p[1]
+    state[0] = here
+    return max(_LEAST, math.exp(-p[0] * stroke * state[1] / p[3]))
+
+
+@block
 def threshold(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, spared, reach, dead_band)."""
     limit = p[1] * p[2]
@@ -179,6 +192,7 @@ _FLOOR = Parameter("floor", "1", 0.0, 0.998, 0.0, "share of the stiffness that s
 _DEAD_BAND = Parameter("dead_band", "mm", 0.0, 0.1, 0.004, "gain of depth that counts as noise", fixed=True)
 _POWER = Parameter("power", "1", -4.0, 12.0, 1.0, "0: exponential, 1: hyperbolic, -1: linear", starts=(-1.0, 1.0))
 _EXPONENT = Parameter("exponent", "1", 0.0, 5.0, 1.0, "power of depth that weights the travel", starts=(1.0, 2.0))
+_LASTS = Parameter("lasts", "s", 1e-3, 1e9, 1e9, "time for which a stroke is held that costs `rate`", fixed=True)
 _REACH = Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth of a stroke on which `rate` is the mean", fixed=True)
 
 EFFECT = Effect(
@@ -253,12 +267,17 @@ EFFECT = Effect(
                 replace(_EXPONENT, lower=0.3, what="power of depth with which the load goes"),
                 Parameter("time_constant", "s", 1e-3, 1e3, 1.0, "within which it relaxes", starts=(0.1, 1.0, 10.0)),
                 _REACH,
-                Parameter(
-                    "lasts", "s", 1e-3, 1e9, 1e9, "time for which a stroke is held that costs `rate`", fixed=True
-                ),
+                _LASTS,
             ),
             sought=False,
             blocks={"elastic": loss},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="creep",
+            what="with the time under load",
+            parameters=(_RATE, replace(_EXPONENT, lower=0.3, what="power of depth with which it goes"), _REACH, _LASTS),
+            blocks={"elastic": creep},
             state=(0.0, 0.0),
         ),
         Form(

@@ -294,6 +294,13 @@ class TestEffects:
         t, x = motion(200.0)
         assert_allclose(LivePad(with_friction, pad_only=True).simulate(t, x), model().simulate(t, x), atol=1e-12)
 
+    def test_a_film_that_bears_tension_is_refused(self) -> None:
+        pad = {"elastic": LAWS["exponential"], "relaxation": RELAXATIONS[2], "contact": "bonded"}
+        for form in ("film", "breaking"):
+            told = Model.from_dict({"pad": pad, "effects": [{"id": "separation", "form": form, "impulse": 0.1}]})
+            with pytest.raises(Refused, match=f"separation \\({form}\\)"):
+                describe(told)
+
     def test_an_effect_that_is_another_pad_is_taken_in(self, monkeypatch: pytest.MonkeyPatch) -> None:
         def one_more(pad: Pad, values: Any) -> Pad:
             r = pad.relaxation

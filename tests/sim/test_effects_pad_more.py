@@ -259,6 +259,20 @@ class TestWhatGoesOnByItself:
         assert_allclose(force, 0.1 * (1.5 - 0.25 * deepest) * np.sin(2 * np.pi * x / 0.7 + 0.3), atol=1e-9)
 
 
+def test_damage_with_the_time_under_load_goes_on_while_it_is_held() -> None:
+    """A stroke to two thirds of `reach` that is held for `lasts` costs `rate` a mm; half as deep, 2^n times less."""
+    t, held = np.linspace(0.0, 6.0, 601), np.array([0.4, 0.8])
+    force = [
+        simulate(
+            LINEAR, [active("damage", "creep", rate=0.1, exponent=3.0, reach=1.2, lasts=6.0)], t, np.full(t.size, x)
+        )
+        for x in held
+    ]
+    kept = np.array([f[-1] / f[0] for f in force])
+    assert_allclose(np.log(kept), [-0.1 * 0.8 / 8.0, -0.1 * 0.8], rtol=2e-3)
+    assert_allclose(np.diff(np.log(force[1])), np.log(kept[1]) / 600, rtol=1e-2)
+
+
 def test_what_relaxes_is_lost_in_holds_too() -> None:
     """A step down to two thirds of `reach` and one back, each held: together as a mm of travel is said to cost. A mode
     that has no time to relax costs nothing, however far it goes."""
