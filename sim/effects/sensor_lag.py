@@ -27,6 +27,9 @@ samples, at any spacing.
   (Doebelin, chapters 3 and 12).
 - `loaded`: one pole of the time τ e^(growth (y/at_force − 1)), which goes with the force y that is there: air in a cell
   of oil gives way the less, the more it bears (H. E. Merritt, Hydraulic Control Systems, Wiley, 1967, section 1.3).
+- `opening`: one pole of the time τ/(1 + opens |F − y|/at_force), F − y what the output y lacks: a filter that opens
+  where the force moves, as weighing indicators have ("adaptive"), and τ that of small changes (of this kind: G. Casiez,
+  N. Roussel, D. Vogel, 1€ filter: a simple speed-based low-pass filter, Proc. CHI 2012, 2527–2530).
 - `warming`: one pole of the time τ e^(growth u + bend (3u² − 1)/2), u = t/at_time − 1, which goes with the time since
   the first sample: oil thins as it warms (G. W. Stachowiak, A. W. Batchelor, Engineering Tribology, 4th ed.,
   Butterworth-Heinemann, 2014, section 2.3). With at_time half the length of the data, τ is its geometric mean.
@@ -45,24 +48,16 @@ from sim.effects.base import Effect, Form, Parameter
 from sim.effects.linear import first_order as lagged
 from sim.effects.linear import low_pass
 from sim.effects.stamps import HALF_TIME
-from sim.jit import State, block, compiled
+from sim.effects.varying_lag import loaded, one_pole, opening, slewing, throttled, warming
+from sim.jit import State, block
 
 _Y, _LAST, _STARTED, _Y2, _V, _V2 = range(6)
-_SINCE = 3  # in place of a second output: time since the first sample
-
-
-@compiled("float64(float64, float64, float64, float64, float64, float64)")
-def _one_pole(dt: float, started: float, y: float, before: float, u: float, tau: float) -> float:
-    """Output of 1/(1 + τs) after dt; at the first sample, and where nothing lags, the input."""
-    if started == 0.0 or tau <= 0.0:
-        return u
-    return lagged(dt, y, before, u, tau)
 
 
 @block
 def first_order(dt: float, u: float, state: State, p: State) -> float:
     """τ y' = u − y; p = (time_constant,)."""
-    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, p[0])
+    y = one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, p[0])
     state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
     return y
 
@@ -70,51 +65,9 @@ def first_order(dt: float, u: float, state: State, p: State) -> float:
 @block
 def partly(dt: float, u: float, state: State, p: State) -> float:
     """A share passes a lag of τ/share, the rest at once; p = (time_constant, share)."""
-    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, p[0] / p[1])
+    y = one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, p[0] / p[1])
     state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
     return u + p[1] * (y - u)
-
-
-@block
-def throttled(dt: float, u: float, state: State, p: State) -> float:
-    """One pole, of one time as the output rises and another as it falls; p = (time_constant, uneven)."""
-    rises = 0.5 * (state[_LAST] + u) > state[_Y]
-    tau = p[0] * (1.0 - p[1] if rises else 1.0 + p[1])
-    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, tau)
-    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
-    return y
-
-
-@block
-def slewing(dt: float, u: float, state: State, p: State) -> float:
-    """One pole, whose output has a greatest rate; p = (time_constant, slow, at_force)."""
-    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, p[0])
-    if state[_STARTED] != 0.0 and p[0] > 0.0 and p[1] > 0.0:
-        most = dt * p[2] / (p[1] * p[0])
-        y = min(max(y, state[_Y] - most), state[_Y] + most)
-    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
-    return y
-
-
-@block
-def loaded(dt: float, u: float, state: State, p: State) -> float:
-    """One pole, whose time goes with the force; p = (time_constant, growth, at_force)."""
-    borne = min(max(state[_Y] / p[2], 0.0), 2.0)
-    tau = p[0] * math.exp(p[1] * (borne - 1.0))
-    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, tau)
-    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
-    return y
-
-
-@block
-def warming(dt: float, u: float, state: State, p: State) -> float:
-    """One pole, whose time goes with the time since the first sample; p = (time_constant, growth, bend, at_time)."""
-    middle = (state[_SINCE] + 0.5 * dt) / p[3] - 1.0
-    tau = p[0] * math.exp(p[1] * middle + p[2] * (1.5 * middle * middle - 0.5))
-    y = _one_pole(dt, state[_STARTED], state[_Y], state[_LAST], u, tau)
-    state[_STARTED], state[_Y], state[_LAST] = 1.0, y, u
-    state[_SINCE] += dt
-    return y
 
 
 @block
@@ -463,6 +416,27 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"sensor": loaded},
+            state=(0.0,) * 3,
+        ),
+        Form(
+            name="opening",
+            what="one pole, quicker the more is missing, as of an adaptive filter",
+            parameters=(
+                _TIME_CONSTANT,
+                Parameter(
+                    "opens",
+                    "1",
+                    0.0,
+                    300.0,
+                    8.0,
+                    "times quicker, less 1, where all of `at_force` is missing",
+                    default=0.0,
+                    starts=(3.0, 12.0, 50.0),
+                ),
+                Parameter("at_force", "N", 1e-3, 1e5, 5.0, "force that tells how far it opens", fixed=True),
+            ),
+            sought=False,
+            blocks={"sensor": opening},
             state=(0.0,) * 3,
         ),
         Form(
