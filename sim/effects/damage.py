@@ -276,7 +276,12 @@ EFFECT = Effect(
         Form(
             name="creep",
             what="with the time under load",
-            parameters=(_RATE, replace(_EXPONENT, lower=0.3, what="power of depth with which it goes"), _REACH, _LASTS),
+            parameters=(
+                _RATE,
+                replace(_EXPONENT, lower=0.3, what="power of depth with which it goes"),
+                _REACH,
+                replace(_LASTS, typical=1.0),
+            ),
             blocks={"elastic": creep},
             state=(0.0, 0.0),
         ),
