@@ -11,6 +11,7 @@ import numpy as np
 from .channel_causes import hum_cause
 from .data import Data, Prepared
 from .evidence import MOST_LEFT, SPEAKS, of_slow_force, within_bounds
+from .gauge import gauged
 from .held_out import SEEN, held_out_square, later_square
 from .hum import Line
 from .hum import find as line_of
@@ -214,7 +215,7 @@ def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fi
         after = onto(last, full, 6, 1e-8)
     else:
         data = prepared.raw
-    after = _spread(prepared, data, after)
+    after = _spread(prepared, data, gauged(data, after))
     if prepared.felt.total_N.any():
         before, after = placed(full, before), placed(data, after)
     return before, after

@@ -28,6 +28,8 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   rate of a crack goes with a power of the rate of loading (S. N. Zhurkov, Int. J. Fract. Mech. 1, 1965, 311–323).
 
 `rate` is what a mm of travel takes at first, of the stiffness; that of `weibull`, one over the travel that leaves 1/e.
+In `loss` and `creep` it is multiplied by `weighs`: a diagnosis states by it what the strokes of its data took, in the
+mean over their travel, however deep they went and long they lasted.
 
 Reference: J. Lemaitre, A Course on Damage Mechanics, 2nd ed., Springer, 1996
 (accumulated strain and energy as measures; chapter 4, fatigue); P. Paris and F. Erdogan, A critical analysis of crack
@@ -138,25 +140,25 @@ def fatigue(dt: float, depth: float, state: State, p: State) -> float:
 
 @block
 def loss(dt: float, depth: float, state: State, p: State) -> float:
-    """Factor on F^e; p = (rate, exponent, time_constant, reach, lasts); state: what the relaxing mode remembers, ∫ ν
-    (u − z)² dt."""
+    """Factor on F^e; p = (rate, exponent, time_constant, reach, lasts, weighs); state: what the mode that relaxes
+    remembers, ∫ ν (u − z)² dt."""
     stroke = _MEAN_STROKE * p[3]
     u = (depth / stroke) ** p[1] if depth > 0.0 else 0.0
     fades = math.exp(-dt / p[2])
     behind = u - state[_MODE]
     state[_MODE] = u - behind * fades
     state[_LOST] += 0.5 * behind * behind * (1.0 - fades * fades)
-    return math.exp(p[0] * stroke * state[_LOST] / math.expm1(-p[4] / p[2]))
+    return math.exp(p[0] * p[5] * stroke * state[_LOST] / math.expm1(-p[4] / p[2]))
 
 
 @block
 def creep(dt: float, depth: float, state: State, p: State) -> float:
-    """Factor on F^e; p = (rate, exponent, reach, lasts); state: depth before, ∫ (δ/s)^n dt."""
+    """Factor on F^e; p = (rate, exponent, reach, lasts, weighs); state: depth before, ∫ (δ/s)^n dt."""
     stroke = _MEAN_STROKE * p[2]
     here = max(depth, 0.0)
     state[1] += dt * (0.5 * (here + state[0]) / stroke) ** p[1]
     state[0] = here
-    return max(_LEAST, math.exp(-p[0] * stroke * state[1] / p[3]))
+    return max(_LEAST, math.exp(-p[0] * p[4] * stroke * state[1] / p[3]))
 
 
 @block
@@ -193,6 +195,7 @@ _DEAD_BAND = Parameter("dead_band", "mm", 0.0, 0.1, 0.004, "gain of depth that c
 _POWER = Parameter("power", "1", -4.0, 12.0, 1.0, "0: exponential, 1: hyperbolic, -1: linear", starts=(-1.0, 1.0))
 _EXPONENT = Parameter("exponent", "1", 0.0, 5.0, 1.0, "power of depth that weights the travel", starts=(1.0, 2.0))
 _LASTS = Parameter("lasts", "s", 1e-3, 1e9, 1e9, "time for which a stroke is held that costs `rate`", fixed=True)
+_WEIGHS = Parameter("weighs", "1", 1e-9, 1e9, 1.0, "travel that such a stroke stands for, over its own", fixed=True)
 _REACH = Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth of a stroke on which `rate` is the mean", fixed=True)
 
 EFFECT = Effect(
@@ -268,6 +271,7 @@ EFFECT = Effect(
                 Parameter("time_constant", "s", 1e-3, 1e3, 1.0, "within which it relaxes", starts=(0.1, 1.0, 10.0)),
                 _REACH,
                 _LASTS,
+                _WEIGHS,
             ),
             sought=False,
             blocks={"elastic": loss},
@@ -281,6 +285,7 @@ EFFECT = Effect(
                 replace(_EXPONENT, lower=0.3, what="power of depth with which it goes"),
                 _REACH,
                 replace(_LASTS, typical=1.0),
+                _WEIGHS,
             ),
             blocks={"elastic": creep},
             state=(0.0, 0.0),
