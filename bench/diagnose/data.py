@@ -20,7 +20,7 @@ from sim.jit import compiled
 
 from .coarse import rounded
 from .hum import Line, find
-from .louder import louder_in_motion
+from .louder import Loudness, loudness
 from .noise import Colour, ForceNoise, force_noise, hold_errors, least_N
 from .whiten import Whitening, whitening
 
@@ -146,7 +146,9 @@ class Prepared:
     """Of those, which are no channel faults."""
     noise: ForceNoise
     louder: Array
-    """By how much it is louder (full.size,) than at rest."""
+    """By how much it is louder (full.size,) than at rest, in the mean of the run."""
+    said_of_noise: list[str]
+    """That it is, in sentences."""
     hum: Line | None
     """What hums, and has been taken out of the force."""
     hum_N: Array
@@ -287,10 +289,12 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         taken_N = line.force_N(felt_s - begins_s, m.force_N)
         m = replace(m, force_N=m.force_N - taken_N)
     motion = felt(m.position_time_s, m.position_mm)
-    noise = force_noise(m, good)
+    loud = loudness(m, good)
+    noise = force_noise(m, good, loud.in_time)
     least = max(rounded(m.force_N[good], resolution(m.force_N)), least_N(m))
-    louder = louder_in_motion(m, good) if noise.air_N > least else np.ones(len(m.force_N))
-    noise_N = noise.at(m.force_N) * louder
+    if noise.air_N <= least:
+        loud = Loudness(np.ones(len(m.force_N)), np.ones(len(m.force_N)))
+    noise_N = noise.at(m.force_N) * loud.times
     sigma_force = max(float(np.sqrt(np.mean(noise_N[good] ** 2))), least)
     noise_N = np.maximum(noise_N, least)
     grid, where = union(motion.time_s, m.force_time_s)
@@ -324,7 +328,8 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         kept=inside,
         good=good,
         noise=replace(noise, force_N=sigma_force, air_N=max(noise.air_N, least)),
-        louder=np.interp(grid, m.force_time_s, louder),
+        louder=np.interp(grid, m.force_time_s, loud.times),
+        said_of_noise=loud.said,
         hum=line,
         hum_N=hum,
         position_noise_mm=max(motion.noise_mm, 1.05 * resolution(m.position_mm)),

@@ -23,7 +23,6 @@ from .channel import FEW, Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, joined
 from .data import Prepared, prepare
 from .evidence import SPEAKS, beyond_limit
-from .louder import said as said_of_noise
 from .needed import Needed, needed
 from .noiseless import without_noise
 from .numbers import PadNumbers, Structure, cause_of
@@ -183,7 +182,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         seconds=time.perf_counter() - begun,
         model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
         notes=list(m.notes),
-        doubts=[*doubts(m, search.believed.pad.pad, path.fits[0].pad), *said_of_noise(prepared.louder)],
+        doubts=[*doubts(m, search.believed.pad.pad, path.fits[0].pad), *prepared.said_of_noise],
         remainders=tests,
         name=m.name,
         seen_once=any(most_sure(all_effects()[c.id], search.reach.rich) < 1.0 for c in causes),

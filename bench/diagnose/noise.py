@@ -1,13 +1,13 @@
 """How noisy the force is, sample by sample, and how much neighbouring samples say the same thing.
 
-σ² = σ_F² + (K σ_x)²: the force's own noise, which may grow with the force (`uneven`) and be louder in motion
-(`louder`), and what is left of the position's through the local stiffness. The colour is that of a Gauss–Markov process
+σ² = σ_F² + (K σ_x)²: the force's own noise, which may grow with the force (`uneven`), and be louder in motion or
+at times (`louder`), and what is left of the position's through the local stiffness. The colour is that of a Gauss–Markov process
 with white noise beside it, ρ_k = a φ^k, or of several whose memories are evenly spread: 1/f.
 
 Both are matched to how far the means of three neighbouring stretches of a hold are off a line, stretches of 1, 2, 4 …
-samples (the three-sample variance of clocks: R. A. Baugh, Proc. 25th Freq. Control Symp., 1971, 222–225). Noise does
-not change in the course of a run, has no power that rises with frequency, and forgets within `MEMORY_S` where it is no
-1/f. What knocks for a while, swings or wanders in the holds is none, and is told from it by that.
+samples (the three-sample variance of clocks: R. A. Baugh, Proc. 25th Freq. Control Symp., 1971, 222–225). Noise has
+no power that rises with frequency, and forgets within `MEMORY_S` where it is no 1/f. What knocks for a while, swings or
+wanders in the holds is none, and is told from it by that; what is louder at times in samples that follow each other is.
 """
 
 from __future__ import annotations
@@ -99,14 +99,16 @@ def hold_errors(m: Measurement, good: Mask) -> list[Part]:
     return parts
 
 
-def force_noise(m: Measurement, good: Mask) -> ForceNoise:
-    """Of the force samples (m,) that are `good`, about smooth curves through the holds."""
-    noise = _of_holds(m, good)
+def force_noise(m: Measurement, good: Mask, louder: Array | None = None) -> ForceNoise:
+    """Of the force samples (m,) that are `good`, about smooth curves through the holds. `louder` (m,): times as loud as
+    in the mean, at rest."""
+    noise = _of_holds(m, good, np.ones(len(m.force_N)) if louder is None else louder)
     return replace(noise, force_N=float(np.sqrt(np.mean(noise.at(m.force_N[good]) ** 2))))
 
 
-def _of_holds(m: Measurement, good: Mask) -> ForceNoise:
+def _of_holds(m: Measurement, good: Mask, louder: Array) -> ForceNoise:
     parts, sample_s = hold_errors(m, good), float(np.median(np.diff(m.force_time_s)))
+    parts = [(t, e / np.interp(t, m.force_time_s, louder), Q) for t, e, Q in parts]
     if sum(len(e) for _, e, _ in parts) < 40:
         return ForceNoise(_from_motion(m.force_N[good]), Colour(), False)
     curves = [np.interp(t, m.force_time_s, m.force_N) - e for t, e, _ in parts]
