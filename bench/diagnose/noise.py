@@ -1,8 +1,8 @@
 """How noisy the force is, sample by sample, and how much neighbouring samples say the same thing.
 
-σ² = σ_F² + (K σ_x)²: the force's own noise, which may grow with the force (`uneven`), and be louder in motion or
-at times (`louder`), and what is left of the position's through the local stiffness. The colour is that of a Gauss–Markov process
-with white noise beside it, ρ_k = a φ^k, or of several whose memories are evenly spread: 1/f.
+σ² = σ_F² + (K σ_x)²: the force's own noise, which may grow with the force (`uneven`), and be louder in motion or at
+times (`louder`), and what is left of the position's through the local stiffness. The colour is that of a Gauss–Markov
+process with white noise beside it, ρ_k = a φ^k, or of several whose memories are evenly spread: 1/f.
 
 Both are matched to how far the means of three neighbouring stretches of a hold are off a line, stretches of 1, 2, 4 …
 samples (the three-sample variance of clocks: R. A. Baugh, Proc. 25th Freq. Control Symp., 1971, 222–225). Noise has
