@@ -138,6 +138,18 @@ class TestSensorLag:
         for form in LAGS:
             assert_allclose(sense(active("sensor_lag", form), EVEN[:50], np.full(50, 4.0)), 4.0)
 
+    def test_a_filter_that_opens_where_much_is_missing(self) -> None:
+        """After a step the output lacks m: m' = −m (1 + a m)/τ, so that m = m₀ e/(1 + a m₀ (1 − e)), e = e^(−t/τ)."""
+        t, opens = (
+            np.arange(0.0, 0.5, 5e-4),
+            active("sensor_lag", "opening", time_constant=0.05, opens=6.0, at_force=2.0),
+        )
+        force = sense(opens, t, np.where(t > 0, 4.0, 0.0))
+        fades, begun = np.exp(-(t[1:] - t[1]) / 0.05), 4.0 - force[1]
+        assert_allclose(4.0 - force[1:], begun * fades / (1.0 + 3.0 * begun * (1.0 - fades)), atol=2e-3)
+        slow = sense(opens, t, 1e-4 * t)
+        assert_allclose(slow[-1], 1e-4 * (t[-1] - 0.05), rtol=1e-3)
+
 
 class TestResonance:
     def ringing(self, frequency: float, damping: float, t: Array) -> Array:

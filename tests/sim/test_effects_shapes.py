@@ -243,16 +243,6 @@ def test_a_cell_that_drains_more_slowly_than_it_fills() -> None:
     assert_allclose(np.interp([1.0101, 1.0301], t, out), np.exp(-np.array([0.01, 0.03]) / 0.026), rtol=3e-3)
 
 
-def test_a_filter_that_opens_where_much_is_missing() -> None:
-    """After a step the output lacks m: m' = −m (1 + a m)/τ, so that m = m₀ e/(1 + a m₀ (1 − e)), e = e^(−t/τ)."""
-    t, opens = np.arange(0.0, 0.5, 5e-4), active("sensor_lag", "opening", time_constant=0.05, opens=6.0, at_force=2.0)
-    force = sense(opens, t, np.where(t > 0, 4.0, 0.0))
-    fades, begun = np.exp(-(t[1:] - t[1]) / 0.05), 4.0 - force[1]
-    assert_allclose(4.0 - force[1:], begun * fades / (1.0 + 3.0 * begun * (1.0 - fades)), atol=2e-3)
-    slow = sense(opens, t, 1e-4 * t)
-    assert_allclose(slow[-1], 1e-4 * (t[-1] - 0.05), rtol=1e-3)
-
-
 def test_friction_that_vibration_smooths() -> None:
     x = np.concatenate([np.linspace(0.0, 1.0, 101), np.full(10, 1.0), np.linspace(1.0, 0.0, 51)[1:]])
     smoothed = active("friction", "smoothed", coulomb=0.3, speed=2.0)

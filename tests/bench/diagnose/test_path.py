@@ -39,7 +39,7 @@ class Told(Search):
         together: Any,
         shapes: dict[float, float] | None = None,
     ) -> None:
-        self.prepared: Any = SimpleNamespace(memory=1.0)
+        self.prepared: Any = SimpleNamespace(memory=1.0, felt=SimpleNamespace(late_s=0.0), sample_s=0.001)
         self.samples, self.ranks, self.together, self.exchanges = NOISE, ranks, together, 0
         self.shapes = shapes or {}
 

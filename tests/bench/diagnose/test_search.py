@@ -193,9 +193,8 @@ def test_delay_and_lag_are_told_apart_where_each_sample_counts(monkeypatch, lag,
     monkeypatch.setattr(
         "bench.diagnose.sieve.refit", lambda data, structure, x, *_: SimpleNamespace(chi2=whole[structure], data=data)
     )
-    begun: Any = SimpleNamespace(
-        prepared=SimpleNamespace(full=full), short=short, effective=samples, _lead=lambda path, best: best.id
-    )
+    prepared = SimpleNamespace(full=full, felt=SimpleNamespace(late_s=0.0), sample_s=0.001)
+    begun: Any = SimpleNamespace(prepared=prepared, short=short, effective=samples, _lead=lambda path, best: best.id)
     begun.late_first = lambda before, ranked: Search.late_first(begun, before, ranked)
     path: Any = SimpleNamespace(fits=[SimpleNamespace(chi2=5e5)])
     other = trial("friction", 4e5)
