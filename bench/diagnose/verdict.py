@@ -27,6 +27,7 @@ NOTHING = 0.1  # of its standard deviation, that a size is
 HARDLY = 0.3  # sure of a name
 SLIGHT, SLIGHTLY = 0.02, 0.65  # of the error: how sure a cause that takes less beside another can be. In a campaign two
 # of three were right, and what the others took was missing from the first one's shape
+BEGUN = 0.02  # of a cause's size, with which it begins anew
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
 
@@ -63,7 +64,24 @@ def chain(prepared: Prepared, fit: Fit, base: Fit, known: Sequence[Fit] = ()) ->
     fits = [fit]
     while len(fits[-1].structure.causes) > own + 1:
         fits.append(without(prepared, fits[-1], len(fits[-1].structure.causes) - 1, known))
-    return [base, *reversed(fits)] if len(fit.structure.causes) > own else [base]
+    if len(fit.structure.causes) == own:
+        return [base]
+    out = [base]
+    for after in reversed(fits):
+        out.append(_no_worse(prepared, out[-1], after))
+    return out
+
+
+def _no_worse(prepared: Prepared, before: Fit, after: Fit) -> Fit:
+    """A fit with one cause more than another, and no worse: where what stood beside the cause has led it into a valley
+    that is, it begins anew, faint, where the other fit is."""
+    size = after.structure.causes[-1].amplitude
+    if after.chi2 <= before.chi2 or size is None:
+        return after
+    values = [*before.structure.values(before.x), after.structure.values(after.x)[-1]]
+    values[-1] = {**values[-1], size.name: BEGUN * values[-1][size.name]}
+    x = after.structure.x(before.x[: len(before.structure.pad.coordinates)], values, before.of_run)
+    return min(after, refit(prepared.short, after.structure, x, 30, 1e-8), key=lambda f: f.chi2)
 
 
 def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[list[float], list[float]]:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.diagnose import verdict
+from bench.diagnose.refit import chi2
 from bench.diagnose.verdict import no_size
 from tests.bench.diagnose.small import fitted
 
@@ -211,3 +213,14 @@ def test_a_search_that_began_anew_must_take_a_part_of_the_error(left, takes):
     none: Any = None
     needed: Any = SimpleNamespace(excess=[1.0, left])
     assert ended(none, none, none, none, needed).takes_a_part == takes
+
+
+def test_with_one_cause_more_a_chain_is_no_worse() -> None:
+    """What stood beside a cause can have led it into a valley where it does harm: two that were found went so."""
+    _, p, fit = fitted("damage", "exponential", "exponential")
+    base = verdict.without(p, fit, 0)
+    lost = fit.x.copy()
+    lost[fit.structure.of_cause(0).start] += 2.0 / fit.structure.coordinates[fit.structure.of_cause(0).start].unit
+    there = replace(fit, x=lost, chi2=chi2(p.short, fit.structure, lost))
+    assert there.chi2 > base.chi2
+    assert verdict.chain(p, there, base)[1].chi2 < base.chi2
