@@ -83,7 +83,7 @@ def card(d: Diagnosis, heading: str = "", *, notes: bool = True, remark: str = "
 
 
 def _sentence(plain: str) -> str:
-    return f"{plain[:1].upper()}{plain[1:]}{'' if plain.endswith('.') else '.'}"
+    return f"{plain[:1].upper()}{plain[1:]}{'' if plain.endswith(('.', '?')) else '.'}"
 
 
 def sections(d: Diagnosis, *, short: bool = False) -> list[tuple[str, str, str]]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose.result import Remainder
-from bench.report.diagnosis import diagnosis_page, write_diagnosis
+from bench.report.diagnosis import card, diagnosis_page, write_diagnosis
 from bench.report.diagnosis_plots import view
 from bench.report.diagnosis_views import Series, View, best_view
 from tests.bench.diagnose.small import made_up
@@ -102,6 +102,11 @@ def test_a_hum_stands_at_its_frequency():
     assert series.x[peak] == pytest.approx(21.0, abs=0.06)
     assert series.before_N[peak] == pytest.approx(0.05, rel=0.2)  # a Hann window's peak, between two bins at worst
     assert series.after_N.max() < 1e-6
+
+
+def test_a_question_ends_with_its_mark():
+    d = made_up(verdict="consistent", causes=[], doubts=["the force is as noisy as it can be: is the screw dry?"])
+    assert "is the screw dry?</p>" in card(d)
 
 
 def test_where_no_cause_is_named_nothing_is_shown_twice():
