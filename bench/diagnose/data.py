@@ -293,7 +293,7 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
     noise = force_noise(m, good, loud.in_time)
     least = max(rounded(m.force_N[good], resolution(m.force_N)), least_N(m))
     if noise.air_N <= least:
-        loud = Loudness(np.ones(len(m.force_N)), np.ones(len(m.force_N)))
+        loud = Loudness.even(len(m.force_N))
     noise_N = noise.at(m.force_N) * loud.times
     sigma_force = max(float(np.sqrt(np.mean(noise_N[good] ** 2))), least)
     noise_N = np.maximum(noise_N, least)

@@ -24,6 +24,7 @@ from .channel_causes import by_themselves, channel_causes, joined
 from .data import Prepared, prepare
 from .evidence import SPEAKS, beyond_limit
 from .needed import Needed, needed
+from .noise import SETTLED_S
 from .noiseless import without_noise
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
@@ -42,7 +43,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 TOLD = 0.002  # of the noise power
-SETTLED_S = 0.15  # after a move
 NO_NOISE = 0.1  # of the noise power: what turns its sign with each sample is taken for some times as much noise
 RIVALS = 4  # models of the best single causes that are kept
 

@@ -18,16 +18,16 @@ from bench.felt_motion import resolution
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 
+from .noise import SETTLED_S
 from .uneven import likeliest
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-WEIGHTS = np.array([1.0, -3.0, 3.0, -1.0])
+THIRD = np.array([1.0, -3.0, 3.0, -1.0])  # difference, of samples at even distances
 PIECE = 16  # samples that are looked at together
 FEWEST = 10  # pieces at rest, and in motion
 APART = 4.0  # squares that say as much as one of noise whose tails may be heavy
-SETTLES_S = 0.15  # after a motion, that what still rings is none
 SMOOTH, ALIKE = 1.8, (0.6, 1.25)  # times the power of pairs over that of samples at rest: of a piece; of all, median
 FASTEST, SHARES = 0.95, (1e-3, 0.1, 0.25, 0.5, 1.0)  # quantile of the speeds, and the shares of that which V may be
 PAYS = 60.0  # twice the log-likelihood that it must gain
@@ -46,6 +46,11 @@ class Loudness:
 
     in_motion: Array
     in_time: Array
+
+    @classmethod
+    def even(cls, count: int) -> Loudness:
+        """As loud everywhere, at so many samples."""
+        return cls(np.ones(count), np.ones(count))
 
     @property
     def times(self) -> Array:
@@ -92,15 +97,15 @@ class _Pieces:
 
 def loudness(m: Measurement, good: Mask) -> Loudness:
     """Of the noise of the force samples (m,); `good` (m,): those that are no channel faults."""
-    even = np.ones(len(m.force_N))
+    even = Loudness.even(len(m.force_N))
     rest, settling = _resting(m)
     pieces = _pieces(m.force_N, rest, good & ~settling)
     if pieces is None:
-        return Loudness(even, even)
+        return even
     usual = float(np.median(pieces.slow[pieces.still]))
     quiet = float(np.mean(pieces.square[pieces.still]))
-    if quiet <= (resolution(m.force_N) / FINE) ** 2 * float(WEIGHTS @ WEIGHTS):
-        return Loudness(even, even)
+    if quiet <= (resolution(m.force_N) / FINE) ** 2 * float(THIRD @ THIRD):
+        return even
     in_time = _course(m, pieces, usual)
     pieces = replace(pieces, square=pieces.square / pieces.of(in_time**2))
     return Loudness(_in_motion(m, rest, pieces, usual), in_time)
@@ -172,7 +177,7 @@ def _resting(m: Measurement) -> tuple[Mask, Mask]:
     rest, settling = np.zeros(len(m.force_time_s), dtype=bool), np.zeros(len(m.force_time_s), dtype=bool)
     for stretch in holds(m.position_time_s, m.position_mm):
         t0, t1 = m.position_time_s[stretch.start], m.position_time_s[stretch.stop - 1]
-        first, settled, last = np.searchsorted(m.force_time_s, [t0, min(t0 + SETTLES_S, t1), t1])
+        first, settled, last = np.searchsorted(m.force_time_s, [t0, min(t0 + SETTLED_S, t1), t1])
         rest[first:last] = True
         settling[first:settled] = True
     return rest, settling
@@ -181,7 +186,7 @@ def _resting(m: Measurement) -> tuple[Mask, Mask]:
 def _differences(force: Array, count: int) -> Array:
     """Third differences (m,) of means of `count` neighbours, about their middles; nan at the ends."""
     out = np.full(len(force), np.nan)
-    kernel = np.repeat(WEIGHTS, count) / count
+    kernel = np.repeat(THIRD, count) / count
     inner = np.convolve(force, kernel[::-1], "valid")
     first = (len(kernel) - 1) // 2
     out[first : first + len(inner)] = inner

@@ -28,6 +28,7 @@ from .uneven import likeliest, share_of_force
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+SETTLED_S = 0.15  # after a move: before, what a mode, a lag or ringing still does is no noise
 LONGEST = 4000  # samples of a hold that are looked at
 LEAST = 12
 MEMORY_S = 0.15  # correlation time beyond which it is no noise, but structure
@@ -47,11 +48,14 @@ WIDTHS = range(2, 17)  # samples of a running mean
 COLOURED, PAYS = 3.0, 20.0  # twice the log-likelihood by which colour, and structure beside the noise, must better it
 
 
+Poles = tuple[tuple[float, float], ...]
+
+
 @dataclass(frozen=True)
 class Colour:
     """ρ_0 = 1, ρ_k = Σ share · φ^k between force samples k apart, of poles (share, φ)."""
 
-    poles: tuple[tuple[float, float], ...] = ()
+    poles: Poles = ()
 
     @property
     def memory(self) -> float:
@@ -90,8 +94,9 @@ def hold_errors(m: Measurement, good: Mask) -> list[Part]:
     for stretch in holds(m.position_time_s, m.position_mm):
         t0, t1 = m.position_time_s[stretch.start], m.position_time_s[stretch.stop - 1]
         first, last = np.searchsorted(m.force_time_s, [t0, t1])
-        # what a mode, a lag or ringing still does just after the motion is no noise
-        first = int(first) + min(int(last - first) // 4, int(np.searchsorted(m.force_time_s[first:last], t0 + 0.15)))
+        first = int(first) + min(
+            int(last - first) // 4, int(np.searchsorted(m.force_time_s[first:last], t0 + SETTLED_S))
+        )
         first = max(first, int(last) - LONGEST)
         kept = np.arange(first, int(last))[good[first : int(last)]]
         if len(kept) >= LEAST:
@@ -302,9 +307,6 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     share = best.carried / sigma2
     poles = tuple((share * part, phi) for part, phi in best.poles)
     return ForceNoise(float(np.sqrt(sigma2)), Colour(poles if share > 0.02 else ()), True)
-
-
-Poles = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
