@@ -86,9 +86,17 @@ def _left_by_the_rest(m: Measurement, prepared: Prepared, flags: Faults, fit: Fi
     errors, modelled = _left(m, prepared, fit)
     known = np.isfinite(errors) & flags.good
     off = standing_off(np.where(known, errors, 0.0), known, _unsure(flags), resolution(m.force_N))
-    if not strays(m, errors, off):
+    off = (off if strays(m, errors, off) else np.zeros_like(off)) | _in_crowds(m, errors, known)
+    if not off.any():
         return errors, modelled
     return _left(m, prepared, onto(fit, prepare(m, flags.good & ~off).doubting(prepared.felt).short, 15, 1e-8))
+
+
+def _in_crowds(m: Measurement, errors: Array, known: Mask) -> Mask:
+    """Samples (m,) beyond what all others foretell, where they are strays: crowded so that hardly one is right among
+    its neighbours, these tell nothing, as where a motor's switching comes through. Else none."""
+    off = known & (np.abs(errors) > far(errors[known])) if known.any() else known
+    return off if strays(m, errors, off) else np.zeros_like(known)
 
 
 def asked_again(
@@ -156,7 +164,7 @@ def _strays_again(
     outlier = standing_off(told, known, suspect, step_N)
     outlier &= ~of_the_model(modelled, errors, outlier)
     pulsed = _in_holds_too(at_rest, pulses(told, known, step_N))
-    outlier |= pulsed
+    outlier |= pulsed | _in_crowds(m, errors, known)
     if prepared.noise.force_N <= least_N(m):
         outlier &= np.abs(told) > LEAST * least_N(m)
     if outlier.sum() < FEW and not suspect.any():
@@ -169,10 +177,6 @@ def _strays_again(
         rest &= ~further
     if strays(m, errors, outlier & ~at_rest):  # where they crowd, some show only once the others are gone
         crowded = standing_off(told, known & ~outlier, suspect, step_N)
-        # of a burst in which hardly a sample is right none is far from its neighbours
-        beyond = known & (np.abs(errors) > far(errors[known & ~outlier & ~crowded]))
-        if strays(m, errors, (outlier | crowded | beyond) & ~at_rest):
-            crowded |= beyond & ~at_rest
         outlier |= crowded
         rest &= ~crowded
     rest &= ~(pulsed | further & at_rest)  # what stands off alone in a hold is no transient, whatever the model is

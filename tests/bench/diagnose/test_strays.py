@@ -30,11 +30,14 @@ def said(id: str, shape: str, size: float, protocol: str, rate_Hz: float) -> lis
 
 @pytest.mark.slow
 @pytest.mark.long
-@pytest.mark.parametrize("size", [1.0, 2.5])
-def test_strays_in_moves_are_told_once_the_model_is_right_beside_them(size):
-    """At the larger size hardly a sample of some bursts is right."""
+@pytest.mark.parametrize(
+    ("size", "protocol", "rate_Hz"),
+    [(1.0, "random_steps", 300.0), (2.5, "random_steps", 300.0), (2.5, "staircase", 400.0)],
+)
+def test_strays_in_moves_are_told_once_the_model_is_right_beside_them(size, protocol, rate_Hz):
+    """At the larger size hardly a sample of some bursts is right; in a staircase, of few moves, of none."""
     right = 0
-    for case, found in said("outliers", "switching", size, "random_steps", 300.0):
+    for case, found in said("outliers", "switching", size, protocol, rate_Hz):
         true, flagged = case.truth.flags["outlier"], found.flags["outliers"]
         hit = (true & flagged).sum()
         right += hit >= 0.9 * true.sum() and hit >= 0.9 * flagged.sum() and [c.id for c in found.causes] == ["outliers"]
