@@ -51,6 +51,8 @@ FALSE_SHARE, SEVERAL = 0.05, 10  # of values beyond the limit that may be noise,
 AROUND_S = 0.02  # either side of a sample, where its speed and acceleration are looked at
 TOGETHER, ONE_WAY = 0.5, 0.5  # of strays, that have another beside them, or go with the motion: fewer do
 BY_CHANCE = 2.5  # deviations of how often neighbours that stand off agree in sign, by chance
+STEADY = 0.2  # of the way within `AROUND_S`, that a change of speed makes at the most
+BURST, MOST_OF_THEM = 5, 0.9  # samples of a burst of strays at the most; and share of the bursts that are no longer
 MOSTLY = 0.5  # of the samples that stand off
 RARE = 0.01  # samples that the noise's own tail puts beyond an outlier's limit, in all the data
 
@@ -403,7 +405,10 @@ def strays(m: Measurement, errors: Array, off: Mask) -> bool:
     with_speed, with_acceleration = (
         abs(float(np.mean(sign * np.sign(way)))) for way in (x[2] - x[0], x[2] - 2.0 * x[1] + x[0])
     )
-    apart = float(np.mean(beside)) < TOGETHER or _as_it_comes(np.sign(errors) * off)
+    # what a motion makes begins where that changes
+    steady = np.abs(x[2] - 2.0 * x[1] + x[0]) < STEADY * (np.abs(x[2] - x[1]) + np.abs(x[1] - x[0]))
+    in_bursts = float(np.mean(steady)) > MOSTLY and _in_bursts(errors, off)
+    apart = float(np.mean(beside)) < TOGETHER or _as_it_comes(np.sign(errors) * off) or in_bursts
     return apart and max(with_speed, with_acceleration) < ONE_WAY
 
 
@@ -413,3 +418,14 @@ def _as_it_comes(sign: Array) -> bool:
     next_, over_next = (sign[lag:] * sign[:-lag] for lag in (1, 2))
     told = [(int(np.count_nonzero(both)), abs(float(both.sum()))) for both in (next_, over_next)]
     return told[0][0] >= SEVERAL and all(total <= BY_CHANCE * np.sqrt(count) for count, total in told)
+
+
+def _in_bursts(errors: Array, off: Mask) -> bool:
+    """Whether samples (m,) that stand off do so for a few at once, and these up or down as it comes from one time to
+    the next, and the next but one: as a mode rings, its half waves turn each time."""
+    begins, ends = np.flatnonzero(np.diff(np.pad(off.astype(np.int8), 1))).reshape(-1, 2).T
+    if len(begins) < SEVERAL or float(np.quantile(ends - begins, MOST_OF_THEM)) > BURST:
+        return False
+    total = np.concatenate([[0.0], np.cumsum(np.where(off, errors, 0.0))])
+    sign = np.sign(total[ends] - total[begins])
+    return all(abs(float(sign[lag:] @ sign[:-lag])) <= BY_CHANCE * np.sqrt(len(sign)) for lag in (1, 2))

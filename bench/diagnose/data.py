@@ -365,39 +365,49 @@ def _blocks(full: Data, stiffness: float, sigma_force: float, jump_mm: float) ->
     n = full.size
     if n <= SHORT:
         return np.arange(n)
-    finest = min(sigma_force / max(stiffness, 1e-9), FINELY * float(np.ptp(full.position_mm)))
+    travel = float(np.ptp(full.position_mm))
+    finest = min(sigma_force / max(stiffness, 1e-9), FINELY * travel)
+    between = float(np.sqrt(finest * travel))
     rate, wider = 0.05, 1.0
     while True:
-        owner = _grouped(full, wider * finest * (rate / 0.05), rate, jump_mm)
+        owner = _grouped(full, wider * finest * (rate / 0.05), rate, jump_mm, between)
         if owner[-1] < TARGET or (rate > FASTEST and (owner[-1] < MOST or wider >= WIDEST)):
             return owner
         # within a move the force goes nearly straight with the position: wide blocks hide less there than after corners
         rate, wider = (rate, 2.0 * wider) if rate > FASTEST else (1.4 * rate, wider)
 
 
-def _grouped(full: Data, reach: float, rate: float, jump_mm: float) -> NDArray[np.intp]:
-    """`reach`: travel within a block, mm; `rate`: growth of blocks; `jump_mm`: what noise alone makes of a change of
-    speed."""
+def _grouped(full: Data, reach: float, rate: float, jump_mm: float, between: float) -> NDArray[np.intp]:
+    """`reach`: travel within a block, mm, and `between` where it has no force and is within a sample's time: there no
+    more is asked than that a law's bend be met; `rate`: growth of blocks; `jump_mm`: what noise alone makes of a change
+    of speed."""
     position = full.position_mm
     step = np.diff(position, prepend=position[0])
     turns = np.zeros(full.size, dtype=bool)
     turns[0] = True
-    for k in (1, 3, 9, 27):  # changes of speed over so many samples
+    for k in (1, 3, 9, 27):  # changes of speed over so many samples, but for those that a sharper one makes
         bent = np.abs(position[2 * k :] - 2 * position[k:-k] + position[: -2 * k]) > max(0.5 * reach, jump_mm)
-        turns[k:-k] |= bent
+        sharper = np.convolve(turns, np.ones(2 * k + 1), mode="same")[k:-k] > 0.5
+        turns[k:-k] |= bent & ~sharper
     corner = np.flatnonzero(turns)
     index = np.arange(full.size)
     since = index - corner[np.searchsorted(corner, index, side="right") - 1]
     # history is kept apart from what counts; positions between two forces are not
     counting = (index >= int(np.argmax(full.weight > 0))).astype(np.int64)
-    return _cut(np.cumsum(np.abs(step)), since.astype(np.float64), reach, rate, full.fold, counting)
+    away = np.cumsum(np.abs(step))
+    nodes = np.where(full.weight > 0, -1.0, full.time_s - full.time_s[0])
+    own = np.array([reach, max(between, reach), rate, full.sample_s])
+    return _cut(away, since.astype(np.float64), nodes, own, full.fold, counting)
 
 
-@compiled("int64[::1](float64[::1], float64[::1], float64, float64, int64[::1], int64[::1])")
+@compiled("int64[::1](float64[::1], float64[::1], float64[::1], float64[::1], int64[::1], int64[::1])")
 def _cut(
-    travelled: Array, since: Array, reach: float, rate: float, fold: NDArray[np.intp], counts: NDArray[np.int64]
+    travelled: Array, since: Array, nodes: Array, own: Array, fold: NDArray[np.intp], counts: NDArray[np.int64]
 ) -> NDArray[np.intp]:
-    """The block of each sample; the first sample, a jump from rest, stays alone."""
+    """The block of each sample; the first sample, a jump from rest, stays alone. `nodes` (n,): times of those without a
+    force, −1 for the others; `own`: travel within a block, and within one of nodes; growth; time within one of nodes.
+    """
+    reach, between, rate, sample = own
     n = travelled.shape[0]
     owner = np.zeros(n, dtype=np.int64)
     at, block = 1, 1
@@ -413,6 +423,16 @@ def _cut(
             and since[end] > 0
         ):
             end += 1
+        while (
+            nodes[at] >= 0.0
+            and end < n
+            and nodes[end] >= 0.0
+            and fold[end] == fold[at]
+            and counts[end] == counts[at]
+            and travelled[end] - travelled[at] <= between
+            and nodes[end] - nodes[at] < sample
+        ):
+            end += 1
         for k in range(at, end):
             owner[k] = block
         block += 1
@@ -421,18 +441,19 @@ def _cut(
 
 
 def _averaged(full: Data, owner: NDArray[np.intp]) -> Data:
-    count = np.bincount(owner).astype(np.float64)
     weight = np.asarray(np.bincount(owner, full.weight), dtype=np.float64)
     inverse = np.asarray(np.bincount(owner, full.weight / full.sigma_N**2), dtype=np.float64)
     with np.errstate(invalid="ignore", divide="ignore"):
         force = np.where(weight > 0, np.bincount(owner, full.weight * full.force_N) / weight, 0.0)
         sigma = np.where(weight > 0, np.sqrt(weight / inverse), full.sigma_N.max())
-    # a block with forces stands at their mean time, one without at the mean of its positions
-    share = np.where(weight[owner] > 0, full.weight, 1.0)
-    shares = np.where(weight > 0, weight, count)
+    starts = np.flatnonzero(np.diff(owner, prepend=-1))
+    # a block with forces stands at their mean time, one without at its middle: on the way, where that bends too
+    middle = np.zeros(full.size)
+    middle[starts + np.bincount(owner) // 2] = 1.0
+    share = np.where(weight[owner] > 0, full.weight, middle)
+    shares = np.where(weight > 0, weight, 1.0)
     time = np.bincount(owner, share * full.time_s) / shares
     position = np.bincount(owner, share * full.position_mm) / shares
-    starts = np.flatnonzero(np.diff(owner, prepend=-1))
     shared = None
     if full.shared_N is not None:
         shared = np.bincount(owner, share * full.shared_N) / shares

@@ -34,7 +34,9 @@ LEAST = 12
 MEMORY_S = 0.15  # correlation time beyond which it is no noise, but structure
 SLOWER_S, SMOOTHER_S = (0.6, 2.5), (0.1, 0.5)  # memory of what wanders, and of what wanders without kinks
 SWINGS_HZ, SWINGS_S = np.geomspace(1.0, 16.0, 9), 4.0  # what swings, and how long it keeps its phase
-FLICKER_S, OCTAVES = (0.64, 0.32, 0.16, 0.08, 0.04), 4.0  # longest memories of noise of 1/f; from pole to pole
+FLICKER_S, OCTAVES = (10.0, 2.5, 0.64, 0.32, 0.16, 0.08, 0.04), 4.0  # longest memories of noise of 1/f, the longest
+# first; from pole to pole
+AS_LIKELY = 5.0  # twice the log-likelihood within which the longest memory is taken: 1/f has no end that is known
 REACH_S = 0.6  # of the longest stretches that are compared
 LEVELS = 12
 WINDOW_S, SHORTEST = 0.4, 24  # in which noise is compared with noise; samples
@@ -276,6 +278,11 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     memories = np.geomspace(0.5 * sample_s, max(MEMORY_S, sample_s), 20).tolist()
     kinds = [_Kind((), [plain]), *(_Kind(_pole(memory, sample_s), [plain, tail(memory)]) for memory in memories)]
     best = _best(kinds, [], found, weight)
+    flickers = [_best([_flicker(longest, sample_s, plain, tail)], [], found, weight) for longest in FLICKER_S]
+    enough = min(f.deviance for f in flickers) + AS_LIKELY
+    flicker = next(f for f in flickers if f.deviance <= enough)
+    if best.poles and flicker.deviance < min(best.deviance, PAYS) + COLOURED:
+        best = flicker  # with no more numbers: of two that serve as well, the one under which less is a finding
     if best.deviance > PAYS:
         widths = [w for w in WIDTHS if w * sample_s < MEMORY_S]
         # of what fades, the memory that adds up to as many samples: near enough to make it white
@@ -298,7 +305,6 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
         other = _best(kinds[:1], beside, found, weight)
         coloured = _best(kinds, beside, found, weight)
         other = coloured if coloured.deviance * MISFIT + COLOURED < other.deviance else other
-        flicker = _best([_flicker(longest, sample_s, plain, tail) for longest in FLICKER_S], [], found, weight)
         if flicker.deviance < min(best.deviance, other.deviance + PAYS):
             best = flicker
         elif other.deviance + PAYS < best.deviance:

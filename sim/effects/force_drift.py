@@ -116,9 +116,12 @@ def bent(dt: float, force: float, state: State, p: State) -> float:
 _RATE = Parameter("rate", "N/s", -1e4, 1e4, 0.002, "rate at the first sample", required=True, amplitude=True)
 
 
-def _time_constant(what: str) -> Parameter:
-    return Parameter("time_constant", "s", 1.0, 1e5, 30.0, what, starts=(3.0, 20.0, 120.0))
+def _time_constant(what: str, starts: tuple[float, ...] = (3.0, 20.0, 120.0)) -> Parameter:
+    return Parameter("time_constant", "s", 1.0, 1e5, 30.0, what, starts=starts)
 
+
+_QUARTERS = (1.5, 2.1, 3.0, 4.2, 6.0, 8.5, 12.0, 17.0, 24.0, 34.0, 48.0, 96.0)
+"""Quarters of a swing, s, near enough to each other that one is in step with any over two or three swings."""
 
 EFFECT = Effect(
     id="force_drift",
@@ -173,8 +176,7 @@ EFFECT = Effect(
         Form(
             name="turning",
             what="turns back, as the warmth of a room",
-            parameters=(_RATE, _time_constant("time after which it turns")),
-            sought=False,
+            parameters=(_RATE, _time_constant("time after which it turns", _QUARTERS)),
             blocks={"sensor": turning},
             state=(0.0,),
         ),

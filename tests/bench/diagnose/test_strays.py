@@ -90,6 +90,26 @@ def test_strays_that_crowd_are_told_from_what_rings():
             assert not strays(m, rung, since < 0.02), frequency_Hz
 
 
+def test_bursts_of_strays_that_keep_their_sign_are_strays():
+    """One to four samples at once, up or down as it comes, while the drive moves."""
+    time = np.arange(0.0, 20.0, 0.001)
+    position = np.interp(time % 1.0, [0.0, 0.3, 0.5, 0.8], [0.0, 0.0, 1.0, 1.0])
+    m = Measurement("bursts", time, position, time, np.zeros_like(time))
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        error = np.zeros(len(time))
+        for begin in rng.choice(np.flatnonzero(np.abs(np.gradient(position)) > 0.0), 120, replace=False):
+            error[begin : begin + rng.integers(1, 5)] = rng.choice([-1.0, 1.0]) * rng.uniform(1.0, 2.0)
+        assert strays(m, error, error != 0.0)
+        towards = np.abs(error) * np.sign(np.gradient(position))  # a force that goes with the motion
+        assert not strays(m, towards, towards != 0.0)
+        struck = np.zeros(len(time))
+        for corner in np.repeat(np.arange(20), 4) + np.tile([0.3, 0.5, 0.8, 1.0], 20):  # where a motion makes something
+            begin = round(1000.0 * corner) + rng.integers(0, 15)
+            struck[begin : begin + rng.integers(2, 5)] = rng.choice([-1.0, 1.0])
+        assert not strays(m, struck, struck != 0.0)
+
+
 def test_a_coarse_channel_that_stays_while_the_force_goes_on_is_stuck():
     """At rest it says the same value for as long by itself, and no length of run tells."""
     for seed in range(5):
