@@ -281,8 +281,8 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     flickers = [_best([_flicker(longest, sample_s, plain, tail)], [], found, weight) for longest in FLICKER_S]
     enough = min(f.deviance for f in flickers) + AS_LIKELY
     flicker = next(f for f in flickers if f.deviance <= enough)
-    if best.poles and flicker.deviance < min(best.deviance, PAYS) + COLOURED:
-        best = flicker  # with no more numbers: of two that serve as well, the one under which less is a finding
+    if 0.0 < best.carried < best.own and flicker.deviance < min(best.deviance, PAYS) + COLOURED:
+        best = flicker  # of two that serve as well: what fades beside more that is white is seldom of one memory
     if best.deviance > PAYS:
         widths = [w for w in WIDTHS if w * sample_s < MEMORY_S]
         # of what fades, the memory that adds up to as many samples: near enough to make it white
