@@ -278,11 +278,13 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     memories = np.geomspace(0.5 * sample_s, max(MEMORY_S, sample_s), 20).tolist()
     kinds = [_Kind((), [plain]), *(_Kind(_pole(memory, sample_s), [plain, tail(memory)]) for memory in memories)]
     best = _best(kinds, [], found, weight)
-    flickers = [_best([_flicker(longest, sample_s, plain, tail)], [], found, weight) for longest in FLICKER_S]
-    enough = min(f.deviance for f in flickers) + AS_LIKELY
-    flicker = next(f for f in flickers if f.deviance <= enough)
-    if 0.0 < best.carried < best.own and flicker.deviance < min(best.deviance, PAYS) + COLOURED:
-        best = flicker  # of two that serve as well: what fades beside more that is white is seldom of one memory
+    flicker = best
+    if _best(kinds[:1], [], found, weight).deviance > PAYS:
+        flickers = [_best([_flicker(longest, sample_s, plain, tail)], [], found, weight) for longest in FLICKER_S]
+        enough = min(f.deviance for f in flickers) + AS_LIKELY
+        flicker = next(f for f in flickers if f.deviance <= enough)
+        if best.carried < best.own and flicker.deviance < min(best.deviance, PAYS) + COLOURED:
+            best = flicker  # of two that serve as well: what fades beside more that is white is seldom of one memory
     if best.deviance > PAYS:
         widths = [w for w in WIDTHS if w * sample_s < MEMORY_S]
         # of what fades, the memory that adds up to as many samples: near enough to make it white
