@@ -401,12 +401,10 @@ def strays(m: Measurement, errors: Array, off: Mask) -> bool:
     x = [
         np.interp(m.force_time_s[at] + shift, m.position_time_s, m.position_mm) for shift in (-AROUND_S, 0.0, AROUND_S)
     ]
-    sign = np.sign(errors[at])
-    with_speed, with_acceleration = (
-        abs(float(np.mean(sign * np.sign(way)))) for way in (x[2] - x[0], x[2] - 2.0 * x[1] + x[0])
-    )
+    sign, turn = np.sign(errors[at]), x[2] - 2.0 * x[1] + x[0]
+    with_speed, with_acceleration = (abs(float(np.mean(sign * np.sign(way)))) for way in (x[2] - x[0], turn))
     # what a motion makes begins where that changes
-    steady = np.abs(x[2] - 2.0 * x[1] + x[0]) < STEADY * (np.abs(x[2] - x[1]) + np.abs(x[1] - x[0]))
+    steady = np.abs(turn) < STEADY * (np.abs(x[2] - x[1]) + np.abs(x[1] - x[0]))
     in_bursts = float(np.mean(steady)) > MOSTLY and _in_bursts(errors, off)
     apart = float(np.mean(beside)) < TOGETHER or _as_it_comes(np.sign(errors) * off) or in_bursts
     return apart and max(with_speed, with_acceleration) < ONE_WAY

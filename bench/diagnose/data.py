@@ -393,21 +393,27 @@ def _grouped(full: Data, reach: float, rate: float, jump_mm: float, between: flo
     index = np.arange(full.size)
     since = index - corner[np.searchsorted(corner, index, side="right") - 1]
     # history is kept apart from what counts; positions between two forces are not
-    counting = (index >= int(np.argmax(full.weight > 0))).astype(np.int64)
-    away = np.cumsum(np.abs(step))
+    counting = index >= int(np.argmax(full.weight > 0))
+    piece = np.cumsum((np.diff(full.fold, prepend=-1) != 0) | np.diff(counting, prepend=False)).astype(np.int64)
     nodes = np.where(full.weight > 0, -1.0, full.time_s - full.time_s[0])
-    own = np.array([reach, max(between, reach), rate, full.sample_s])
-    return _cut(away, since.astype(np.float64), nodes, own, full.fold, counting)
+    away, between = np.cumsum(np.abs(step)), max(between, reach)
+    return _cut(away, since.astype(np.float64), nodes, piece, reach, between, rate, full.sample_s)
 
 
-@compiled("int64[::1](float64[::1], float64[::1], float64[::1], float64[::1], int64[::1], int64[::1])")
+@compiled("int64[::1](float64[::1], float64[::1], float64[::1], int64[::1], float64, float64, float64, float64)")
 def _cut(
-    travelled: Array, since: Array, nodes: Array, own: Array, fold: NDArray[np.intp], counts: NDArray[np.int64]
+    travelled: Array,
+    since: Array,
+    nodes: Array,
+    piece: NDArray[np.int64],
+    reach: float,
+    between: float,
+    rate: float,
+    sample: float,
 ) -> NDArray[np.intp]:
     """The block of each sample; the first sample, a jump from rest, stays alone. `nodes` (n,): times of those without a
-    force, −1 for the others; `own`: travel within a block, and within one of nodes; growth; time within one of nodes.
-    """
-    reach, between, rate, sample = own
+    force, −1 for the others; a block of these may go so far `between` two forces, and takes less time than a `sample`.
+    `piece` (n,): no block has samples of two."""
     n = travelled.shape[0]
     owner = np.zeros(n, dtype=np.int64)
     at, block = 1, 1
@@ -417,8 +423,7 @@ def _cut(
         while (
             end < n
             and end - at < most
-            and fold[end] == fold[at]
-            and counts[end] == counts[at]
+            and piece[end] == piece[at]
             and travelled[end] - travelled[at] <= reach
             and since[end] > 0
         ):
@@ -427,8 +432,7 @@ def _cut(
             nodes[at] >= 0.0
             and end < n
             and nodes[end] >= 0.0
-            and fold[end] == fold[at]
-            and counts[end] == counts[at]
+            and piece[end] == piece[at]
             and travelled[end] - travelled[at] <= between
             and nodes[end] - nodes[at] < sample
         ):

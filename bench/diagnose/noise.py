@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -267,6 +268,7 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     def mean(values: list[Array]) -> Array:
         return np.array([v[a].mean() for v, a, n in zip(values, at, counts, strict=True) if n >= 3.0])
 
+    @cache  # the longer memories of 1/f have shorter ones among theirs
     def tail(memory_s: float, frequency_Hz: float = 0.0) -> Array:
         turn = np.exp(-sample_s / memory_s + 2j * np.pi * frequency_Hz * sample_s)
         return mean(_expected(parts, levels, _Fading(complex(turn) if frequency_Hz else float(turn.real))))
