@@ -241,7 +241,7 @@ def test_a_number_about_which_the_cost_only_jumps_has_a_standard_error(monkeypat
 @pytest.mark.parametrize("seed", range(1, 5))
 def test_the_numbers_of_another_shape_begin_where_they_fit_best(seed: int) -> None:
     """A screw worn where it is used most: the place of that is told by no number of a play."""
-    c, prepared, fit = fitted("backlash", "worn", "play", 1.5, seed)
+    c, prepared, fit = fitted("backlash", "worn", "play", 1.5, seed, noise_kind="white")
     play = fit.structure.causes[0]
     form = candidates.narrowed(
         play.effect.form("running_out"), candidates.Reach.of(prepared.short, fit.structure, 0.01)
@@ -261,12 +261,13 @@ def test_the_numbers_of_another_shape_begin_where_they_fit_best(seed: int) -> No
 
 @pytest.mark.parametrize("seed", range(1, 4))
 def test_a_drift_that_comes_and_goes_has_a_course(seed: int) -> None:
-    """The sun shines on it, and clouds come."""
-    _, prepared, fit = fitted("force_drift", "clouds", "linear", 1.5, seed)
+    """The sun shines on it, and clouds come. Of noise with a memory the means of a stand-in leave more than their
+    number, so it has none."""
+    _, prepared, fit = fitted("force_drift", "clouds", "linear", 1.5, seed, noise_kind="white")
     done = reshaped(prepared.short, refit(prepared.short, fit.structure, fit.x, 20, 1e-8))
     assert done.structure.causes[0].form.name == "wandering"
     noise = np.count_nonzero(prepared.short.weight > 0)
-    assert done.chi2 - noise < 0.2 * (fit.chi2 - noise)
+    assert done.chi2 - noise < 0.1 * (fit.chi2 - noise)
 
 
 def test_a_size_is_as_sure_as_it_is_where_its_course_is_given() -> None:
