@@ -43,13 +43,14 @@ PLACES = (
 REPORT, PLAY, FRAME, PROBE, DEPTH, LAW, ELASTIC, RATE, CONTACT, GAP, SENSOR, SAMPLING = range(12)
 
 # program: sizes and offsets, where each place's blocks start, then (address, state, parameters) a block
-MODES, UNILATERAL, FILM, ONCE, INNER, INNER_SIZE, TRIAL, SCRATCH, RELAX, CACHE, STARTS = range(11)
+MODES, UNILATERAL, FILM, ONCE, BONDED, INNER, INNER_SIZE, TRIAL, SCRATCH, RELAX, CACHE, STARTS = range(12)
 ROWS = STARTS + len(PLACES) + 1
 
 # state: what the solver keeps …
 X, Y, CELL, SLOPE, RESIDUAL, TRIAL_CELL = range(6)
 OUTER = 6
-# … and the pad's own, at INNER and in its trial copies: w_1 … w_r follow
+# … and the pad's own, at INNER and in its trial copies: w_1 … w_r follow, and the blocks' own; then the same once more,
+# where a part of the pad stays bonded
 FE, PAD_DEPTH, PAD_FORCE, SURFACE, STEEPNESS, PULLED, W = range(7)
 
 _TOLERANCE = 4e-15
@@ -198,6 +199,51 @@ def torn(program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, 
     return F if pulled < left else -left / dt
 
 
+@compiled("void(CPointer(int64), CPointer(float64), CPointer(float64), float64)")
+def faded(program: Ints, params: Doubles, state: Doubles, scaled: float) -> None:
+    """Decay and gain of the modes in a step of `scaled` seconds, which are kept while the step stays the same."""
+    r, relax, cache = program[MODES], program[RELAX], program[CACHE]
+    if state[cache] != scaled:
+        state[cache] = scaled
+        for i in range(r):
+            x = params[relax + 1 + r + i] * scaled
+            gain = ramp_gain(x)
+            state[cache + 1 + i] = 1.0 - x * gain
+            state[cache + 1 + r + i] = gain
+
+
+@compiled("float64(CPointer(int64), CPointer(float64), int64, float64, float64)")
+def touched(program: Ints, state: Doubles, pad: int, dt: float, depth: float) -> float:
+    """For how long the pad at `pad` is touched in a step to `depth`: less where it is met within the step, at full
+    speed; a frame between takes that up."""
+    before, surface = state[pad + PAD_DEPTH], state[pad + SURFACE]
+    if before < surface < depth and program[STARTS + FRAME] == program[STARTS + FRAME + 1]:
+        return float(dt * (depth - surface) / (depth - before))
+    return dt
+
+
+@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64)")
+def bonded_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, y: float) -> float:
+    """One step of a pad that stays bonded, on the state moved by `shift`: its force, N."""
+    r, relax, cache = program[MODES], program[RELAX], program[CACHE]
+    pad = program[INNER] + shift
+    depth = chain(program, params, state, shift, DEPTH, dt, y)
+    faded(program, params, state, dt * product(program, params, state, shift, RATE, dt, depth))
+    old = state[pad + FE]
+    Fe = product(program, params, state, shift, ELASTIC, dt, depth)
+    Fe *= chain(program, params, state, shift, LAW, dt, depth)
+    F = params[relax] * Fe
+    for i in range(r):
+        w, gain = state[pad + W + i], state[cache + 1 + r + i]
+        state[pad + W + i] = state[cache + 1 + i] * w + gain * (Fe - old)
+        F += params[relax + 1 + i] * state[pad + W + i]
+    F += total(program, params, state, shift, CONTACT, touched(program, state, pad, dt, depth), depth)
+    state[pad + FE] = Fe
+    state[pad + PAD_DEPTH] = depth
+    state[pad + SURFACE] = max(depth, 0.0)
+    return float(F)
+
+
 @compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64)")
 def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, y: float) -> float:
     """One step of everything between probe position and load cell, on the state moved by `shift`. F_cell in N."""
@@ -205,14 +251,7 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
     pad = program[INNER] + shift
     relax, cache = program[RELAX], program[CACHE]
     depth = chain(program, params, state, shift, DEPTH, dt, y)
-    scaled = dt * product(program, params, state, shift, RATE, dt, depth)
-    if state[cache] != scaled:  # decay and gain of the modes are kept while the step stays the same
-        state[cache] = scaled
-        for i in range(r):
-            x = params[relax + 1 + r + i] * scaled
-            gain = ramp_gain(x)
-            state[cache + 1 + i] = 1.0 - x * gain
-            state[cache + 1 + r + i] = gain
+    faded(program, params, state, dt * product(program, params, state, shift, RATE, dt, depth))
     old = state[pad + FE]
     A = 0.0
     B = params[relax]
@@ -221,11 +260,8 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
         A += c * (state[cache + 1 + i] * state[pad + W + i] - gain * old)
         B += c * gain
     surface = max(depth, 0.0)
-    since = dt
     before = state[pad + PAD_DEPTH]
-    if before < state[pad + SURFACE] < depth and program[STARTS + FRAME] == program[STARTS + FRAME + 1]:
-        # touched within the step, at full speed; a frame between takes that up
-        since = dt * (depth - state[pad + SURFACE]) / (depth - before)
+    since = touched(program, state, pad, dt, depth)
     plain = program[STARTS + CONTACT] == program[STARTS + CONTACT + 1]
     simple = plain and program[STARTS + GAP] == program[STARTS + GAP + 1]
     lasting = program[STARTS + ELASTIC] == program[STARTS + ELASTIC + 1]  # nothing remembers where the surface was
@@ -266,6 +302,9 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
         state[pad + W + i] = state[cache + 1 + i] * w + state[cache + 1 + r + i] * (Fe - old)
     if not simple:
         F += total(program, params, state, shift, GAP, dt, surface - depth)
+    if program[BONDED] != 0:
+        twin = shift + program[INNER_SIZE] // 2
+        F += params[program[BONDED]] * (bonded_step(program, params, state, twin, dt, y) - F)
     state[pad + FE] = Fe
     state[pad + PAD_DEPTH] = depth
     state[pad + PAD_FORCE] = F

@@ -34,6 +34,9 @@ class Pad:
     """Impulse of tension that a film bears before a `unilateral` pad lets go."""
     film_once: bool = False
     """Whether that is the impulse it bears in all: a bond that is broken does not heal."""
+    bonded: float = 0.0
+    """Share of its face that stays bonded where a `unilateral` pad lets go: columns beside each other, as in a Winkler
+    foundation."""
 
 
 class Cascade:

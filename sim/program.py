@@ -42,6 +42,8 @@ def lay_out(pad: Pad, effects: Sequence[Active]) -> Layout:
     parameters += pad.law.kernel_parameters
     film_at = len(parameters) if pad.film_Ns > 0.0 else 0
     parameters.append(pad.film_Ns)
+    bonded_at = len(parameters) if pad.bonded > 0.0 else 0
+    parameters.append(pad.bonded)
 
     r = pad.relaxation.order
     inner = [0.0] * (k.W + r)
@@ -54,6 +56,8 @@ def lay_out(pad: Pad, effects: Sequence[Active]) -> Layout:
         region += active.form.state
         parameters += active.form.vector(active.values)
 
+    if bonded_at:
+        inner += inner
     cache_at = k.OUTER + len(outer)
     inner_at = cache_at + 1 + 2 * r
     trial_at = inner_at + len(inner)
@@ -80,6 +84,7 @@ def lay_out(pad: Pad, effects: Sequence[Active]) -> Layout:
     program[k.UNILATERAL] = pad.unilateral
     program[k.FILM] = film_at
     program[k.ONCE] = pad.film_once
+    program[k.BONDED] = bonded_at
     program[k.INNER] = inner_at
     program[k.INNER_SIZE] = len(inner)
     program[k.TRIAL] = trial_at

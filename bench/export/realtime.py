@@ -80,7 +80,7 @@ def version() -> str:
 
 def _is_pad(active: Active, pad: Pad) -> bool:
     form = active.form
-    if active.effect.id == "separation" and pad.film_Ns > 0.0:  # a film that bears tension has no form there
+    if active.effect.id == "separation" and (pad.film_Ns > 0.0 or pad.bonded > 0.0):  # what bears tension has no form
         return False
     return form.amend is not None and not form.blocks and form.time_shift is None
 

@@ -8,6 +8,8 @@
 - `breaking`: a bond bears an impulse of tension in all, from lift to lift, and is broken for good once that is used up:
   an adhesive under loads that come back gathers damage until it parts (W. V. Mars, A. Fatemi, A literature survey on
   fatigue analysis approaches for rubber, Int. J. Fatigue 24, 2002, 949–961).
+- `partly`: a share of the face stays bonded and pulls, the rest lets go; both are columns of one pad beside each other
+  (a Winkler foundation: K. L. Johnson, Contact Mechanics, 1985, section 4.3).
 
 Reference: T. C. T. Ting, The contact stresses between a rigid indenter and a viscoelastic half-space, J. Appl. Mech.
 33, 1966, 845–854 (receding contact on a surface that recovers); J. Stefan, Versuche über die scheinbare Adhäsion,
@@ -38,6 +40,10 @@ def _breaks(pad: Pad, values: Mapping[str, float]) -> Pad:
     return pad if pad.unilateral else replace(_lets_go_late(pad, values), film_once=True)
 
 
+def _lets_go_in_part(pad: Pad, values: Mapping[str, float]) -> Pad:
+    return pad if pad.unilateral else replace(pad, unilateral=True, bonded=values["bonded"])
+
+
 def _impulse(what: str, most: int) -> Parameter:
     """Begun at each quarter of a decade: an impulse that no lift reaches changes nothing with a little more or less."""
     return Parameter("impulse", "N*s", 1e-6, 1e4, 0.02, what, starts=tuple(10.0 ** (k / 4) for k in range(-16, most)))
@@ -62,6 +68,14 @@ EFFECT = Effect(
             what="a bond bears an impulse of tension in all, and is broken for good",
             parameters=(_impulse("tension over time, of all lifts, that breaks the bond", 10),),
             amend=_breaks,
+        ),
+        Form(
+            name="partly",
+            what="a share of the face stays bonded",
+            parameters=(
+                Parameter("bonded", "1", 0.0, 0.9, 0.3, "share of the face that stays bonded", starts=(0.1, 0.3, 0.6)),
+            ),
+            amend=_lets_go_in_part,
         ),
     ),
 )

@@ -294,10 +294,10 @@ class TestEffects:
         t, x = motion(200.0)
         assert_allclose(LivePad(with_friction, pad_only=True).simulate(t, x), model().simulate(t, x), atol=1e-12)
 
-    def test_a_film_that_bears_tension_is_refused(self) -> None:
+    def test_what_bears_tension_for_a_while_or_in_part_is_refused(self) -> None:
         pad = {"elastic": LAWS["exponential"], "relaxation": RELAXATIONS[2], "contact": "bonded"}
-        for form in ("film", "breaking"):
-            told = Model.from_dict({"pad": pad, "effects": [{"id": "separation", "form": form, "impulse": 0.1}]})
+        for form, number in (("film", "impulse"), ("breaking", "impulse"), ("partly", "bonded")):
+            told = Model.from_dict({"pad": pad, "effects": [{"id": "separation", "form": form, number: 0.1}]})
             with pytest.raises(Refused, match=f"separation \\({form}\\)"):
                 describe(told)
 

@@ -80,6 +80,25 @@ class TestSeparationAndAdhesion:
         assert 2e-3 * float(np.maximum(-force, 0.0).sum()) == pytest.approx(impulse, rel=0.02)
         assert force[tears:].min() == 0.0 and force[1200:].max() == pytest.approx(force[600:1200].max(), rel=0.05)
 
+    @pytest.mark.parametrize("also", [[], ["stress_softening"], ["viscous_damping"]], ids=str)
+    def test_of_a_face_that_stays_bonded_in_part_the_parts_pull_and_let_go_beside_each_other(
+        self, also: list[str]
+    ) -> None:
+        t, x = walk(600)
+        bonded, others = replace(SOFT, unilateral=False), [active(name) for name in also]
+        pulls, lets_go = simulate(bonded, others, t, x), simulate(SOFT, others, t, x)
+        assert np.abs(pulls - lets_go).max() > 1.0
+        for share in (0.0, 0.05, 0.4):
+            force = simulate(bonded, [active("separation", "partly", bonded=share), *others], t, x)
+            assert_allclose(force, share * pulls + (1 - share) * lets_go, atol=1e-9)
+
+    def test_a_frame_gives_by_what_both_parts_bear(self) -> None:
+        """All that is bonded and none: the two ends of a share, through the loop with a frame."""
+        t, x = walk(300)
+        bonded, frame = replace(SOFT, unilateral=False), active("frame_compliance")
+        part = replace(SOFT, bonded=1.0)
+        assert_allclose(simulate(part, [frame], t, x), simulate(bonded, [frame], t, x), atol=1e-9)
+
     @pytest.mark.parametrize(
         ("form", "shape"),
         [
