@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,7 @@ from .hum import Line, find
 from .louder import Loudness, loudness
 from .noise import Colour, ForceNoise, force_noise, hold_errors, least_N
 from .whiten import Whitening, whitening
+from .work import Work
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -56,6 +57,8 @@ class Data:
     colour: Colour = Colour()
     """Of the noise, from force sample to force sample, which are `sample_s` apart, as far as the cost knows of it."""
     sample_s: float = 1.0
+    work: Work = field(default_factory=Work, compare=False)
+    """What has been simulated on it and on what stands for it."""
 
     @property
     def size(self) -> int:
@@ -466,5 +469,5 @@ def _averaged(full: Data, owner: NDArray[np.intp]) -> Data:
         time, position, force, weight, sigma, full.fold[starts], shared,
         None if full.stretch is None else full.stretch[starts],
         tared if tared is not None and tared.any() else None,
-        full.colour, full.sample_s,
+        full.colour, full.sample_s, full.work,
     )  # fmt: skip

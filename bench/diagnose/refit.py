@@ -69,6 +69,7 @@ class Fit:
 
 def force_at(data: Data, structure: Structure, x: Array) -> Array:
     """Simulated force on the grid (n,), N; not finite where the numbers make no plant."""
+    data.work.add(data.size)
     position = data.position_mm + structure.surface_mm(x)
     with np.errstate(all="ignore"):
         force = structure.cascade(x).simulate_on(data.grid, position)

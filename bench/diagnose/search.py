@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -39,7 +38,7 @@ Array = NDArray[np.float64]
 MANY_MORE = 2  # numbers of a shape beyond those of the plain one: then two plain causes are asked for in its place
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
-LONGEST_S = 60.0  # of processor, so that a busy machine finds the same, after which no further cause is looked for
+MOST_WORK = 150_000_000  # simulated samples, after which no further cause is looked for
 A_SHAPE = 0.1  # of what is left beyond the noise, that another shape of a cause takes where no further cause pays
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
@@ -81,6 +80,11 @@ class Search(Shaping):
         """What the motion as felt may be off by (runs, p), drawn once."""
         return redrawn(self.prepared, np.random.default_rng(SEED))
 
+    @property
+    def work(self) -> int:
+        """Samples simulated so far."""
+        return self.short.work.samples
+
     def base(self, pads: Sequence[Array]) -> Fit:
         """The believed structure with its numbers refitted, from each of some vectors of the pad."""
         fits = [refit(self.short, self.believed, x, 12, 1e-5) for x in self._starts(pads)]
@@ -113,21 +117,21 @@ class Search(Shaping):
     def path(self, base: Fit) -> Path:
         """Causes one after the other while each pays; then those that others have made needless go. Where the first
         leaves much whatever follows, the same from one that stood near it."""
-        begun = time.process_time()
+        begun = self.work
         path = self._walked(Path([base]), begun)
         path = self._from_another_first(path, begun) or path
         self._compare(path)
         return path
 
-    def _walked(self, path: Path, begun: float) -> Path:
-        """A path carried on, cause by cause, until none pays or there is no time. `begun`: of processor, s."""
+    def _walked(self, path: Path, begun: int) -> Path:
+        """A path carried on, cause by cause, until none pays or the work is too much. `begun`: where it was then."""
         asked = 1  # fits on the path when the causes' shapes were last asked
-        turned_at = time.process_time()
+        turned_at = self.work
         while len(path.fits) <= MOST_CAUSES:
-            now = time.process_time()
-            # a third cause is not begun where it would not be done in time: most often there is none
-            will_take = now - turned_at if len(path.fits) > 2 else 0.0
-            if now - begun + will_take >= LONGEST_S:
+            now = self.work
+            # a third cause is not begun where it would not be done with what is left: most often there is none
+            will_take = now - turned_at if len(path.fits) > 2 else 0
+            if now - begun + will_take >= MOST_WORK:
                 break
             turned_at = now
             self._whitened(path)
@@ -147,7 +151,7 @@ class Search(Shaping):
                 break
         return path
 
-    def _from_another_first(self, path: Path, begun: float) -> Path | None:
+    def _from_another_first(self, path: Path, begun: int) -> Path | None:
         """The path to two causes from one that stood near the first, where the first leaves much and those two leave
         nothing: of two that look like a third together, that one comes first. None: there is none."""
         if len(path.fits) < 2:
@@ -157,13 +161,13 @@ class Search(Shaping):
         if left < MUCH_LEFT * (base.chi2 - self.expected) or unexplained(end.chi2, self.expected) <= 0.0:
             return None
         for near in self._near(base, path.rivals[0]):
-            if time.process_time() - begun >= LONGEST_S:
+            if self.work - begun >= MOST_WORK:
                 break
             first = self._carried(near, ALL)
             if not self._two_leave_less(first, end):
                 continue
             again = self._begun_with(path, first)
-            again = self._walked(again, time.process_time())  # there is hope, and it has its own time
+            again = self._walked(again, self.work)  # there is hope, and it has work of its own
             two = len(again.fits) == 3 and again.evidence[1].share > A_PART
             beyond = again.fits[-1].chi2 - self.expected
             if two and self._clean(again.fits[0].chi2, again.fits[-1].chi2) and beyond < LESS * left:
@@ -173,12 +177,12 @@ class Search(Shaping):
 
     def from_others(self, path: Path) -> Iterator[Path]:
         """Paths that begin with those that stood behind a path's first cause and take a good part of what it takes, all
-        within the time that one has."""
-        begun, prepared, ranked, before = time.process_time(), self.prepared, path.rivals[0], path.measures[0].before
+        with the work that one has."""
+        begun, prepared, ranked, before = self.work, self.prepared, path.rivals[0], path.measures[0].before
         enough = GOOD_PART * (before - ranked[0].fit.chi2)
         others = (t for t in ranked if t.id != ranked[0].id and before - t.fit.chi2 > enough)
         for other in islice(others, OTHERS):
-            if time.process_time() - begun >= LONGEST_S:
+            if self.work - begun >= MOST_WORK:
                 break
             self.prepared = prepared  # which the path before may have whitened
             again = self._begun_with(path, self._carried(other, ALL))

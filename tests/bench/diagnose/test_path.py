@@ -15,6 +15,7 @@ from bench.diagnose.numbers import cause_of
 from bench.diagnose.path import Measure, Path
 from bench.diagnose.result import Number
 from bench.diagnose.search import Search
+from bench.diagnose.work import Work
 from sim.effects import effect
 
 module = importlib.import_module("bench.diagnose.search")
@@ -39,7 +40,8 @@ class Told(Search):
         together: Any,
         shapes: dict[float, float] | None = None,
     ) -> None:
-        self.prepared: Any = SimpleNamespace(memory=1.0, felt=SimpleNamespace(late_s=0.0), sample_s=0.001)
+        short = SimpleNamespace(work=Work())
+        self.prepared: Any = SimpleNamespace(memory=1.0, felt=SimpleNamespace(late_s=0.0), sample_s=0.001, short=short)
         self.samples, self.ranks, self.together, self.exchanges = NOISE, ranks, together, 0
         self.shapes = shapes or {}
 

@@ -25,7 +25,7 @@ from sim.model import Model
 from sim.pad import Pad
 from sim.relaxation import Relaxation
 from tests.bench.diagnose.small import measurement
-from tests.truth.cases import Case, draw_case
+from tests.truth.cases import Case, draw_case, pair_case
 
 QUIET: dict[str, Any] = {"jitter": "none", "noise_kind": "white", "own_clock": False, "law": "exponential"}
 """Of a case that shows little but what is hidden in it."""
@@ -87,6 +87,19 @@ def test_another_law_is_told_by_the_form_of_few_numbers(seed):
     trial = search.ranked(base, only=["elastic_law", "encoder_error"])[0]
     assert trial.cause.form.name.startswith("polynomial")
     assert trial.fit.chi2 < 1.05 * search.expected
+
+
+def test_a_search_ends_with_its_work_and_not_with_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the machine does beside it, as much is simulated and the same is found."""
+    c = pair_case(1, ("stress_softening", "force_drift"), protocol="staircase", rate_hz=100.0, **QUIET)
+    found = []
+    for most in (1, 1, 50_000_000):  # simulated samples
+        monkeypatch.setattr("bench.diagnose.search.MOST_WORK", most)
+        search, base = begun(c)
+        end = search.path(base).fits[-1]
+        found.append((search.work, [cause.id for cause in end.structure.causes], end.chi2))
+    assert found[0] == found[1] and len(found[0][1]) == 1
+    assert sorted(found[2][1]) == ["force_drift", "stress_softening"] and found[2][2] < found[0][2]
 
 
 def test_where_a_model_runs_away_its_error_has_no_end_and_no_step_is_taken_there():
