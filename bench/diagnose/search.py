@@ -238,13 +238,13 @@ class Search(Shaping):
         if same and unexplained(other.chi2, self.expected) <= 0.0:
             return other  # no further cause, in whatever shape, leaves less
         if turn.found.pays or same:
-            shaped = self._in_shape(now, turn.ranked, len(path.fits) == 1, same)
+            plain, shaped = turn.ranked, self._in_shape(now, turn.ranked, len(path.fits) == 1, same)
             if len(path.fits) > 1 or not self._two_instead(path, best, shaped[0]):
                 turn.ranked = shaped
             if same and not self._alone_clean(now.chi2, turn.ranked[0].fit.chi2, other.chi2):
                 return other
         if turn.found.pays and len(path.fits) == 1:
-            turn.ranked = self._plain_first(path, turn.ranked)
+            turn.ranked = self._plain_first(path, turn.ranked, plain)
         if turn.ranked[0] is not best:
             best = turn.ranked[0]
             turn.found = self._lead(path, best)
@@ -365,16 +365,22 @@ class Search(Shaping):
             return False
         return self._clean(now.chi2, second.fit.chi2) and self.judge(plain.fit, second.fit, now).pays
 
-    def _plain_first(self, path: Path, ranked: list[Trial]) -> list[Trial]:
+    def _plain_first(self, path: Path, ranked: list[Trial], plain: list[Trial]) -> list[Trial]:
         """The candidates for a first cause, with one of few numbers in front of a curve of many that is half-way to
-        everything, where that one and a second leave nothing."""
+        everything, where that one and a second leave nothing. It is the curve's own cause as it was before it was asked
+        for its shape (`plain`: the candidates then), or the next that stands near."""
         lead = ranked[0]
         if unexplained(lead.fit.chi2, self.expected) <= 0.0:
             return ranked
-        plain = next((t for t in self._near(path.fits[-1], ranked) if t.fit.free + MANY_MORE < lead.fit.free), None)
-        if plain is None or not self._two_instead(path, plain, self._told(lead)):
+        few = lead.fit.free - MANY_MORE
+        own = (t for t in plain if t.id == lead.id and t.fit.free < few)
+        near = (t for t in self._near(path.fits[-1], ranked) if t.fit.free < few)
+        asked = [*islice(own, 1), *islice(near, 1)]
+        if not asked:
             return ranked
-        return [plain, *(t for t in ranked if t is not plain)]
+        told = self._told(lead)
+        first = next((t for t in asked if self._two_instead(path, t, told)), None)
+        return ranked if first is None else [first, *(t for t in ranked if t.id != first.id)]
 
     def _whitened(self, path: Path) -> None:
         """Once little is left beside the noise, its colour goes into the cost."""

@@ -292,7 +292,10 @@ def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_o
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("bench.diagnose.search.believable", lambda *_: True)
         patch.setattr("bench.diagnose.search.least_gain", lambda *_: 0.0)
-        assert asked._plain_first(path, [curve, plain])[0].id == first
+        assert asked._plain_first(path, [curve, plain], [curve, plain])[0].id == first
+        curve.id = plain.id  # it is a shape of the very cause
+        asked._near = lambda now, ranked: []
+        assert (asked._plain_first(path, [curve], [plain])[0] is plain) == (first == plain.id)
 
 
 @pytest.mark.parametrize(("seeds", "least"), [(3, 3), pytest.param(10, 8, marks=pytest.mark.long)])
