@@ -77,7 +77,7 @@ def repeated(force: Array, but: Mask) -> Mask:
         long |= length >= _least_of_many(length[counted], in_the_middle, bool(np.any(long & counted)))
     else:
         chance = equal_by_chance(force)
-        p = 0.0 if no_accident(int(same.sum()), chance) else min(max(chance / len(force), AGAIN), 0.97)
+        p = 0.0 if no_accident(int(same[~but].sum()), chance) else min(max(chance / len(force), AGAIN), 0.97)
         long = length >= _least(p, len(force))
     long &= counted
     for start, count in zip(first[long].tolist(), length[long].tolist(), strict=True):

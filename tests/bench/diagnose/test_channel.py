@@ -464,6 +464,16 @@ def test_a_fine_scale_that_repeats_itself_by_chance_does_not_stick(seed, other_z
     assert faults(held).stuck[3001:3019].all() and faults(held).stuck.sum() < 24
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_readings_at_a_ceiling_are_no_reason_for_others_to_stick(seed: int) -> None:
+    """They repeat each other by the thousand; elsewhere two of some digits are alike by chance."""
+    rng, t = np.random.default_rng(seed), np.arange(20000)
+    force = 2.0 * np.sin(t / 900.0) ** 2 + 0.003 * rng.standard_normal(t.size)
+    found = faults(np.round(np.minimum(force, 1.7), 5))
+    assert found.limit_N == 1.7 and found.saturated.sum() > 4000
+    assert not found.stuck.any()
+
+
 def test_runs_of_a_coarse_channel_are_told_by_how_many_of_them_are_long() -> None:
     """Each of 3 to 20 samples might be an accident; so many of a dozen and more are none."""
     hits, found, true = 0, 0, 0
