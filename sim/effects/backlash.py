@@ -8,8 +8,11 @@
 - `loaded`: the gap is closed by the force itself, within `closing_force`: a joint that is loose at rest and seated
   under load. Deflection gap · (1 − e^(−|F|/closing_force)) in the force's direction, solved with the pad.
 - `running_out`: the width goes with the place, gap · (1 + swell · sin(2π x/turn + angle)): a gear, pulley or screw that
-  runs out, or is worn where it is used most (ISO 230-2: the reversal value is stated for each
-  place). `gap` is the mean; `side` is 0 where the surface was found pushing, and 0.5 in `centred`.
+  runs out (ISO 230-2: the reversal value is stated for each place). `gap` is the mean; `side` is 0 where the surface
+  was found pushing, and 0.5 in `centred`.
+- `worn`: wider in one place, gap · (1 + wear · e^(−((x − at)/width)²)): a screw or guide worn where it is used most (J.
+  F. Archard, Contact and rubbing of flat surfaces, J. Appl. Phys. 24, 1953, 981–988: wear goes with load and way).
+  `gap` is the width where nothing is worn; `side` as in `running_out`.
 - `wearing`: gap · (1 + growth (t − at_time)), as of screws that work loose under load that comes and goes (G. H.
   Junker, New criteria for self-loosening of fasteners under vibration, SAE Technical Paper 690055, 1969), or of a nut
   that warms.
@@ -84,6 +87,18 @@ def running_out(dt: float, x: float, state: State, p: State) -> float:
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
         state[1] = x + gap * (p[5] - p[4])
+    state[1] = min(max(state[1], x - p[4] * gap), x + (1.0 - p[4]) * gap)
+    return state[1]
+
+
+@block
+def worn(dt: float, x: float, state: State, p: State) -> float:
+    """Probe side, about x by the gap there; p = (gap, wear, worn_at, width, side)."""
+    off = (x - p[2]) / p[3]
+    gap = p[0] * (1.0 + p[1] * math.exp(-off * off))
+    if state[_STARTED] == 0.0:
+        state[_STARTED] = 1.0
+        state[1] = x
     state[1] = min(max(state[1], x - p[4] * gap), x + (1.0 - p[4]) * gap)
     return state[1]
 
@@ -224,6 +239,20 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"play": running_out},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="worn",
+            what="wider in one place",
+            parameters=(
+                _GAP,
+                Parameter("wear", "1", 0.0, 20.0, 1.0, "how much wider there, over the gap elsewhere", starts=(1.0,)),
+                Parameter("worn_at", "mm", -50.0, 50.0, 1.0, "where it is worn most", bend=True),
+                Parameter("width", "mm", 0.02, 20.0, 0.3, "how far from it 1/e of that is left", starts=(0.15, 0.5)),
+                _SIDE,
+            ),
+            sought=False,
+            blocks={"play": worn},
             state=(0.0, 0.0),
         ),
         Form(

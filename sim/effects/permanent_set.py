@@ -20,6 +20,9 @@
 - `lifting`: as the probe goes back, by set · deepest · (1 − e^(−(deepest − y)/within)), and it stays: the law is the
   pad's as it is pressed first, set in it, as of what is read from the curve of unloading (W. C. Oliver, G. M. Pharr, J.
   Mater. Res. 7, 1992, 1564–1583).
+- `pounded`: towards set · deepest with the way pressed, set · deepest · (1 − e^(−W/way)), W = ∫ max(dy, 0) below the
+  sunken surface: what many presses make thinner (ISO 3385, Flexible cellular polymeric materials: determination of
+  fatigue by constant-load pounding).
 
 `deepest` is in the probe's coordinate; the pad's depth is what is left above the sunken surface.
 
@@ -37,6 +40,7 @@ from sim.jit import State, block
 _DEEPEST, _SUNK, _BACK = range(3)
 _TIMES, _AWAY = 1, 2
 _LOADED = 1
+_PRESSED, _LAST = 1, 2
 
 
 @block
@@ -127,6 +131,16 @@ def lifting(dt: float, y: float, state: State, p: State) -> float:
     sunk = -p[0] * state[_DEEPEST] * math.expm1((max(y, 0.0) - state[_DEEPEST]) / p[1])
     state[_SUNK] = max(state[_SUNK], sunk)
     return y - state[_SUNK]
+
+
+@block
+def pounded(dt: float, y: float, state: State, p: State) -> float:
+    """Depth below the sinking surface; p = (set, way); state: deepest, way pressed, last position."""
+    sunk = -p[0] * state[_DEEPEST] * math.expm1(-state[_PRESSED] / p[1])
+    state[_PRESSED] += max(y - max(state[_LAST], sunk), 0.0)
+    state[_LAST] = y
+    state[_DEEPEST] = max(state[_DEEPEST], y)
+    return float(y + p[0] * state[_DEEPEST] * math.expm1(-state[_PRESSED] / p[1]))
 
 
 _SET = Parameter(
@@ -249,6 +263,16 @@ EFFECT = Effect(
             ),
             blocks={"depth": flowing},
             state=(0.0, 0.0),
+        ),
+        Form(
+            name="pounded",
+            what="with the way pressed",
+            parameters=(
+                _SET,
+                Parameter("way", "mm", 0.05, 1e4, 10.0, "way pressed on which 1 − 1/e of it comes", starts=(2.0, 20.0)),
+            ),
+            blocks={"depth": pounded},
+            state=(0.0, 0.0, 0.0),
         ),
     ),
 )

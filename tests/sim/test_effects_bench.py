@@ -147,7 +147,15 @@ class TestBacklash:
         back = slice(1150, 2001)
         assert_allclose(probe[back] - x[back], gap[back], atol=1e-12)
 
-    @pytest.mark.parametrize(("name", "none"), [("running_out", {"swell": 0.0}), ("wearing", {"growth": 0.0})])
+    def test_a_worn_play_is_wider_in_one_place(self) -> None:
+        x, probe, _ = self.loop("worn", gap=0.1, wear=2.0, worn_at=0.6, width=0.3)
+        gap = 0.1 * (1 + 2.0 * np.exp(-(((x - 0.6) / 0.3) ** 2)))
+        back = slice(1350, 2001)
+        assert_allclose(probe[back] - x[back], gap[back], atol=1e-12)
+
+    @pytest.mark.parametrize(
+        ("name", "none"), [("running_out", {"swell": 0.0}), ("wearing", {"growth": 0.0}), ("worn", {"wear": 0.0})]
+    )
     def test_a_play_that_changes_is_counted_from_where_a_plain_one_is(self, name: str, none: dict[str, float]) -> None:
         for side, plain in ((0.0, "play"), (0.5, "centred")):
             _, probe, _ = self.loop(name, gap=0.1, side=side, **none)

@@ -177,6 +177,15 @@ class TestPermanentSet:
         assert_allclose(self.surface("yielding", 2.0, set=0.1, limit=0.8), 0.12, rtol=1e-9)
         assert_allclose(self.surface("yielding", 0.7, set=0.1, limit=0.8), 0.0, atol=1e-12)
 
+    def test_what_is_pounded_sinks_with_the_way_pressed(self) -> None:
+        for deepest in (0.5, 2.0):
+            once = 0.1 * deepest * (1 - math.exp(-deepest / 1.5))
+            assert_allclose(self.surface("pounded", deepest, set=0.1, way=1.5), once, rtol=1e-3)
+        x = np.tile(np.concatenate([ramp(1.0, 201)[:201], ramp(1.0, 201)[200:-1]]), 30)
+        force = simulate(LINEAR, [active("permanent_set", "pounded", set=0.1, way=1.5)], np.arange(x.size) * 1e-3, x)
+        tops = force[200::401][:30] / K
+        assert np.all(np.diff(tops[:8]) < -1e-4) and tops[-1] == pytest.approx(0.9, abs=1e-4)
+
     def test_gradual(self) -> None:
         plant = Cascade(LINEAR, [active("permanent_set", "gradual", set=0.2, rate=0.5)]).plant()
         plant.step(0.0, 1.0)

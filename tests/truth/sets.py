@@ -3,7 +3,7 @@
 from .effects import EFFECTS
 from .effects.registry import _FIRST, _JUDGE, _MORE, Hide
 
-SETS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "judge")
+SETS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth", "judge")
 
 
 def _set(hide: Hide) -> str:

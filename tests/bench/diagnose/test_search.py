@@ -68,6 +68,15 @@ def test_a_form_that_no_other_of_its_family_is_like_is_found(seed):
     assert trial.fit.chi2 < 1.1 * search.expected
 
 
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3))])
+def test_a_set_that_comes_by_and_by_with_the_way_pressed_is_found(seed: int) -> None:
+    c = draw_case(seed, ("permanent_set",), 1.0, "pounding", protocol="rich", rate_hz=150.0, jitter="none")
+    search, base = begun(c)
+    trial = search.ranked(base)[0]
+    assert (trial.id, trial.cause.form.name) == ("permanent_set", "pounded")
+    assert trial.fit.chi2 < 1.2 * search.expected  # it comes by a hyperbola there, and by an exponential here
+
+
 @pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (3, 9))])
 def test_a_missing_mode_is_found_though_the_others_have_spread_over_its_place(seed):
     """From where too few modes have ended, steps along one more of them lead far away."""
