@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 PERIODS = 36
 TURNS = 24  # parts of a period
+APART = 1.2  # times the waves of one sine, that a second one has at the least: else they are one that swells
 RATIO = 2.5  # of the second sine to the first at the most, to start with
 
 Column = Callable[[float, float], Array]
@@ -108,8 +109,11 @@ def starts(form: Form, column: Column, waves: Waves, most: int) -> Iterator[tupl
     step = lowest / math.ceil(lowest * PERIODS / max(highest - lowest, 1e-9 * highest))
     combined = tuple(_combined(form, range(round(lowest / step), int(highest / step) + 1)))
     found = waves.promises(column, step, combined)
+    firsts = {k for k, _ in combined} if two_periods(form) else set()
     taken: list[int] = []
     for promise, k, other, sizes in found:
+        if other in firsts and np.hypot(*sizes[2:]) > np.hypot(*sizes[:2]):
+            continue  # the greater one comes first: it is among them the other way round too
         if len(taken) < most and all(abs(k - before) > 1 for before in taken):
             taken.append(k)
             # just inside the bounds, at which an extreme period would stay
@@ -124,7 +128,8 @@ def _combined(form: Form, waves: range) -> list[tuple[int, int]]:
     if two_periods(form):
         order = named["order"]
         shorter = range(waves.start, 2 * waves.stop)
-        return [(k, other) for k in waves for other in shorter if order.lower < other / k < order.upper]
+        ratios = {(k, other): other / k for k in waves for other in shorter}
+        return [pair for pair, r in ratios.items() if order.lower < r < order.upper and not 1.0 / APART < r < APART]
     return [(k, 2 * k if "ratio" in named else 0) for k in waves]
 
 

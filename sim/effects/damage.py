@@ -26,6 +26,9 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   `loss`, held for `lasts` costs as much as elsewhere.
 - `by_speed`: e^(−rate · ∫ (v/10 mm/s)^n ds) over the way loaded: quick strokes harm more, or less (n below 0), as the
   rate of a crack goes with a power of the rate of loading (S. N. Zhurkov, Int. J. Fract. Mech. 1, 1965, 311–323).
+- `by_way`: e^(−rate · way): by all the way the probe has gone deeper below the first surface, whether the pad had come
+  back to it by then or not, as cycles are counted on a machine that knows of strokes alone (ISO 3385, which pounds
+  foams to a given stroke).
 
 `rate` is what a mm of travel takes at first, of the stiffness; that of `weibull`, one over the travel that leaves 1/e.
 In `loss` and `creep` it is multiplied by `weighs`: a diagnosis states by it what the strokes of its data took, in the
@@ -94,6 +97,19 @@ def exponential(dt: float, depth: float, state: State, p: State) -> float:
     """Factor on F^e; p = (rate, floor, dead_band)."""
     state[_LAST], state[_TRAVEL] = loaded(depth, p[2], state[_LAST], state[_TRAVEL])
     return p[1] + (1.0 - p[1]) * math.exp(-p[0] * state[_TRAVEL] / (1.0 - p[1]))
+
+
+@block
+def gone(dt: float, depth: float, state: State, p: State) -> float:
+    """The depth as it is, and the way to it; p = (rate, dead_band)."""
+    state[_LAST], state[_TRAVEL] = loaded(depth, p[1], state[_LAST], state[_TRAVEL])
+    return depth
+
+
+@block
+def by_way(dt: float, depth: float, state: State, p: State) -> float:
+    """Factor on F^e after the way that `gone` has counted; p = (rate, dead_band)."""
+    return max(_LEAST, math.exp(-p[0] * state[_TRAVEL]))
 
 
 @block
@@ -226,6 +242,14 @@ EFFECT = Effect(
             parameters=(_RATE, _DEAD_BAND),
             sought=False,
             blocks={"elastic": linear},
+            state=(0.0, 0.0),
+        ),
+        Form(
+            name="by_way",
+            what="with all the way down, in contact or not",
+            parameters=(_RATE, _DEAD_BAND),
+            sought=False,
+            blocks={"depth": gone, "elastic": by_way},
             state=(0.0, 0.0),
         ),
         Form(

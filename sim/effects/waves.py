@@ -20,8 +20,8 @@ SECOND_HARMONIC = (
 )
 
 SECOND_PERIOD = (
-    Parameter("ratio", "1", 0.0, 1.0, 0.3, "second amplitude over the first"),
-    Parameter("order", "1", 1.2, 4.0, 1.5, "waves of the second for each of the first", starts=(1.3, 1.6)),
+    Parameter("ratio", "1", 0.0, 3.0, 0.3, "second amplitude over the first"),
+    Parameter("order", "1", 0.25, 4.0, 1.5, "waves of the second for each of the first", starts=(0.63, 1.3, 1.6)),
     phase("second_phase", "phase of the second at position 0"),
 )
 

@@ -229,11 +229,31 @@ class TestDamage:
             ("exponential", np.exp(-rate * travel)),
             ("hyperbolic", 1 / (1 + rate * travel)),
             ("linear", 1 - rate * travel),
+            ("by_way", np.exp(-rate * travel)),
         ):
             force = simulate(LINEAR, [active("damage", form, rate=rate)], t, cycles)
             assert_allclose(force[crests], K * factor, rtol=1e-9)
         floor = simulate(LINEAR, [active("damage", rate=rate, floor=0.6)], t, cycles)
         assert_allclose(floor[crests], K * (0.6 + 0.4 * np.exp(-rate / 0.4 * travel)), rtol=1e-9)
+
+    def test_the_way_counts_where_the_pad_has_not_come_back_too(self) -> None:
+        slow = replace(LINEAR, relaxation=Relaxation((0.5,), (0.05,)))
+        x = np.tile(np.concatenate([ramp(1.0, 201)[:201], ramp(1.0, 201)[200:-1]]), 8)
+        t = 1e-3 * np.arange(x.size)
+        whole = simulate(slow, [], t, x)
+        assert np.any(whole[402:] == 0.0)  # it lets go at each lift
+        by_way, travel = (
+            simulate(slow, [active("damage", form, rate=0.05, dead_band=0.0)], t, x)[200::401] / whole[200::401]
+            for form in ("by_way", "exponential")
+        )
+        assert_allclose(by_way[0], travel[0], rtol=1e-12)
+        assert np.all(by_way[1:] < travel[1:])
+        loose = replace(slow, relaxation=Relaxation())  # what does not relax is met where it was left
+        by_way, travel = (
+            simulate(loose, [active("damage", form, rate=0.05, dead_band=0.0)], t, x)
+            for form in ("by_way", "exponential")
+        )
+        assert_allclose(by_way, travel, rtol=1e-12)
 
     @pytest.mark.parametrize("power", [-3.0, -1.0, 0.0, 1.0, 6.0])
     def test_the_power_form_solves_its_law(self, power: float) -> None:

@@ -30,3 +30,10 @@ def test_a_surface_sinks_with_the_way_pressed(seed):
     assert 2.0 < half_mm < 5.0
     n = np.arange(1.0, 7.0)  # presses, and mm
     assert np.allclose(sunk, told["set"] * n / (n + half_mm), rtol=1e-9)
+
+
+def test_a_pad_is_softer_by_all_the_way_gone_down():
+    _, told, build = hidden("damage", "all_the_way", motion=Path(-0.5).to(1.0, 20.0).motion(), depth=1.0)
+    cycle = np.concatenate([np.linspace(-0.5, 1.0, 301), np.linspace(1.0, -0.5, 301)[1:]])
+    gain = build.plant.gain[-1](np.arange(3005.0), np.tile(cycle, 5))
+    assert np.allclose(gain[600::601], np.exp(-told["rate"] * np.arange(1.0, 6.0)), rtol=1e-9)

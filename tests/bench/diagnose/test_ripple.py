@@ -44,11 +44,14 @@ def test_a_ripple_begins_near_its_period_with_its_phases_and_harmonic(id_, seed)
     assert np.mean((near - felt) ** 2) < 0.2 * np.mean(felt**2)
 
 
+@pytest.mark.parametrize("greater", ["longer", "shorter"])
 @pytest.mark.parametrize("id_", ["cogging", "encoder_error"])
 @pytest.mark.parametrize("seed", range(6))
-def test_two_ripples_begin_near_their_periods(id_, seed):
+def test_two_ripples_begin_near_their_periods_the_greater_first(id_, seed, greater):
     rng = np.random.default_rng(seed)
     amplitude, period, order = 0.5 * (1 + rng.random()), float(rng.uniform(0.9, 1.9)), float(rng.uniform(1.4, 3.0))
+    if greater == "shorter":
+        period, order = 0.7 * period, 1.0 / order
     phase, second = rng.uniform(-np.pi, np.pi, 2)
     ratio = float(rng.uniform(0.3, 0.8))
     felt = amplitude * (_wave(period, phase) + ratio * _wave(period / order, second))
@@ -58,6 +61,7 @@ def test_two_ripples_begin_near_their_periods(id_, seed):
     assert 0.8 * float(felt @ felt) < promise <= float(felt @ felt) * (1 + 1e-9)
     assert abs(3.0 / values["period"] - 3.0 / period) < 0.25
     assert abs(3.0 * values["order"] / values["period"] - 3.0 * order / period) < 0.25
+    assert values["ratio"] < 0.95
 
 
 def test_starts_are_apart_and_within_bounds():

@@ -41,6 +41,7 @@ def stated(fit: Fit, name: str) -> tuple[float, float]:
         pytest.param("inertia", "cable_chain", "rigid", "mass", "growing", marks=pytest.mark.long),
         ("friction", "tared", "coulomb", "coulomb", "tared_out"),
         pytest.param("clock_skew", "resynchronised", "linear", "skew", "set_once", marks=pytest.mark.long),
+        ("damage", "all_the_way", "exponential", "rate", "by_way"),
         pytest.param("damage", "hyperbolic", "linear", "rate", "hyperbolic", marks=pytest.mark.long),
     ],
 )

@@ -24,3 +24,16 @@ def permanent_set(build: Build, shape: str, size: float) -> dict[str, float]:
 
     build.plant.height.append(height)
     return {"set": most}
+
+
+@more_shapes("damage", "all_the_way")
+def damage(build: Build, shape: str, size: float) -> dict[str, float]:
+    """e^{−r Λ} by all the way Λ that the probe has gone down below the first surface, where the pad is or not."""
+    rate = 0.01 * size * spread(build.rng, 0.6, 1.6)
+
+    def gain(t, x):
+        depth = np.maximum(x, 0.0)
+        return np.exp(-rate * np.cumsum(np.maximum(np.diff(depth, prepend=0.0), 0.0)))
+
+    build.plant.gain.append(gain)
+    return {"rate": rate}
