@@ -383,11 +383,13 @@ class Search(Shaping):
         return ranked if first is None else [first, *(t for t in ranked if t.id != first.id)]
 
     def _whitened(self, path: Path) -> None:
-        """Once little is left beside the noise, its colour goes into the cost."""
+        """Once little is left beside the noise, its colour goes into the cost; or no more than such noise leaves, where
+        it remembers for long: what is small and changes fast cannot be seen beside it before."""
         if self.prepared.memory == 1.0:
             return
         last, prepared = path.fits[-1], self.prepared
-        if mean_square(prepared.full, last.structure, last.x) < QUIET * prepared.floor_N**2:
+        square = mean_square(prepared.full, last.structure, last.x)
+        if square < QUIET * prepared.floor_N**2 or last.chi2 < self.expected:
             self.prepared = prepared.white()
             path.fits = [refit(self.short, f.structure, f.x, 20, 1e-8) for f in path.fits]
 

@@ -41,7 +41,7 @@ import math
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.stamps import AT_TIME
 from sim.effects.waves import phase
-from sim.jit import State, block
+from sim.jit import State, block, compiled
 
 _STARTED = 0
 
@@ -80,6 +80,12 @@ def gradual(dt: float, x: float, state: State, p: State) -> float:
     return result
 
 
+@compiled("float64(float64, float64, float64, float64)")
+def behind(x: float, gap: float, side: float, last: float) -> float:
+    """Where a probe at `last` is once the motor is at x, of whose play a share `side` is ahead of it."""
+    return min(max(last, x - side * gap), x + (1.0 - side) * gap)
+
+
 @block
 def running_out(dt: float, x: float, state: State, p: State) -> float:
     """Probe side, about x by the gap there; p = (gap, swell, turn, angle, side, start)."""
@@ -87,7 +93,7 @@ def running_out(dt: float, x: float, state: State, p: State) -> float:
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
         state[1] = x + gap * (p[5] - p[4])
-    state[1] = min(max(state[1], x - p[4] * gap), x + (1.0 - p[4]) * gap)
+    state[1] = behind(x, gap, p[4], state[1])
     return state[1]
 
 
@@ -99,7 +105,7 @@ def worn(dt: float, x: float, state: State, p: State) -> float:
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
         state[1] = x
-    state[1] = min(max(state[1], x - p[4] * gap), x + (1.0 - p[4]) * gap)
+    state[1] = behind(x, gap, p[4], state[1])
     return state[1]
 
 
@@ -124,7 +130,7 @@ def wearing(dt: float, x: float, state: State, p: State) -> float:
     if state[_STARTED] == 0.0:
         state[_STARTED] = 1.0
         state[1] = x
-    state[1] = min(max(state[1], x - p[2] * gap), x + (1.0 - p[2]) * gap)
+    state[1] = behind(x, gap, p[2], state[1])
     return state[1]
 
 

@@ -8,6 +8,7 @@
   differ (S. Chen, C. Namuduri, S. Mir, Controller-induced parasitic torque ripples in a PM synchronous motor, IEEE
   Trans. Ind. Appl. 38, 2002, 1273–1281).
 - `swelling`: the sine grows along the way, as towards the end of the magnets: amplitude · (1 + growth (y − at_depth)).
+- `uneven`: as `swelling`, of the sine with its second and third harmonic: edges of slots, in a row that ends.
 - `trailing`: the sine of a place that is dragged along, as iron's field is behind the magnets': the middle of a play of
   the full width `trail`.
 - `slotted`: tanh(steepness · sin) over its own first harmonic, of that amplitude: flat over teeth and slots, steep at
@@ -35,7 +36,7 @@ from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.stamps import AT_TIME
-from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC, SECOND_PERIOD
+from sim.effects.waves import GROWTH, PHASE, SECOND_HARMONIC, SECOND_PERIOD, phase
 from sim.jit import State, block
 
 
@@ -67,6 +68,14 @@ def unbalanced(dt: float, y: float, state: State, p: State) -> float:
 def swelling(dt: float, y: float, state: State, p: State) -> float:
     """Force in N; p = (amplitude, period, phase, growth, at_depth)."""
     return p[0] * (1.0 + p[3] * (y - p[4])) * math.sin(2.0 * math.pi * y / p[1] + p[2])
+
+
+@block
+def uneven(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, ratio, second_phase, third_ratio, third_phase, growth, at_depth)."""
+    angle = 2.0 * math.pi * y / p[1]
+    wave = math.sin(angle + p[2]) + p[3] * math.sin(2.0 * angle + p[4]) + p[5] * math.sin(3.0 * angle + p[6])
+    return p[0] * (1.0 + p[7] * (y - p[8])) * wave
 
 
 @block
@@ -208,6 +217,21 @@ EFFECT = Effect(
             what="a sine that grows along the way",
             parameters=(_AMPLITUDE, _PERIOD, PHASE, *GROWTH),
             blocks={"probe": swelling},
+        ),
+        Form(
+            name="uneven",
+            what="a sine and two harmonics that grow along the way",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                *SECOND_HARMONIC,
+                Parameter("third_ratio", "1", 0.0, 3.0, 0.2, "third harmonic over the first"),
+                phase("third_phase", "phase of the third harmonic at position 0"),
+                *GROWTH,
+            ),
+            sought=False,
+            blocks={"probe": uneven},
         ),
         Form(
             name="trailing",

@@ -37,3 +37,16 @@ def test_a_pad_is_softer_by_all_the_way_gone_down():
     cycle = np.concatenate([np.linspace(-0.5, 1.0, 301), np.linspace(1.0, -0.5, 301)[1:]])
     gain = build.plant.gain[-1](np.arange(3005.0), np.tile(cycle, 5))
     assert np.allclose(gain[600::601], np.exp(-told["rate"] * np.arange(1.0, 6.0)), rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cogging_grows_along_a_row_that_ends(seed):
+    _, told, build = hidden("cogging", "end_of_row", motion=Path(-0.5).to(1.0, 20.0).motion(), depth=1.0, seed=seed)
+    x = np.linspace(0.5, 0.5 + told["period"], 2001)[:-1]
+    felt = build.plant.felt[-1](None, x, None, None)
+    zero = build.plant.felt[-1](None, np.array([0.5, 0.5 + told["period"]]), None, None)
+    grows = np.log(zero[1] / zero[0]) / told["period"]
+    assert 0.39 < abs(grows) < 0.81
+    lines = np.fft.rfft(felt * np.exp(-grows * (x - 0.5))) / 1000
+    assert np.abs(lines[1]) == pytest.approx(told["amplitude"], rel=1e-6)
+    assert np.all(np.abs(lines[2:4]) > 0.19 * told["amplitude"]) and np.all(np.abs(lines[4:20]) < 1e-9)

@@ -160,6 +160,27 @@ class Expecting(Search):
 
 
 @pytest.mark.parametrize(
+    ("square", "chi2", "memory", "white"),
+    [
+        (1.9, 5000.0, 30.0, True),  # little is left beside the noise
+        (2.5, 5000.0, 30.0, False),
+        (2.5, 900.0, 30.0, True),  # more than little, but no more than noise of that memory leaves
+        (2.5, 900.0, 1.0, False),  # of no memory
+    ],
+)
+def test_the_noises_colour_goes_into_the_cost_where_no_more_is_left_than_it_makes(square, chi2, memory, white):
+    told: Any = object.__new__(Expecting)
+    whitened = SimpleNamespace(short="whitened")
+    told.prepared = SimpleNamespace(memory=memory, full=None, floor_N=1.0, short="plain", white=lambda: whitened)
+    path: Any = SimpleNamespace(fits=[SimpleNamespace(chi2=chi2, structure=None, x=None)])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("bench.diagnose.search.mean_square", lambda *_: square)
+        patch.setattr("bench.diagnose.search.refit", lambda short, *_: short)
+        told._whitened(path)
+    assert (told.prepared is whitened) is white and (path.fits == ["whitened"]) is white
+
+
+@pytest.mark.parametrize(
     ("after", "reshaped", "alone"),
     [
         (1010.0, 1090.0, True),  # both leave nothing that speaks, and one fits better by far more than chance

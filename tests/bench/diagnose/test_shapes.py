@@ -38,6 +38,7 @@ def stated(fit: Fit, name: str) -> tuple[float, float]:
         pytest.param("depth_dependent_relaxation", "knee", "linear", "slope", "knee", marks=pytest.mark.long),
         ("cogging", "iron", "sine", "period", "trailing"),
         ("backlash", "worn_spot", "play", "gap", "worn"),
+        ("cogging", "end_of_row", "harmonics", "amplitude", "uneven"),
         pytest.param("inertia", "cable_chain", "rigid", "mass", "growing", marks=pytest.mark.long),
         ("friction", "tared", "coulomb", "coulomb", "tared_out"),
         pytest.param("clock_skew", "resynchronised", "linear", "skew", "set_once", marks=pytest.mark.long),
