@@ -35,15 +35,14 @@ from .search import A_PART, Search
 from .swing import Swing
 from .swing import find as swinging
 from .units import doubts
-from .verdict import explains, floor_told, found, seen
+from .verdict import explains, floor_told, found, seen, speaks
 from .way import most_sure
 from .write import model_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-TOLD, MUCH = 0.002, 0.3  # of the noise power: what is left beyond it where a test sees something in that; and where it
-# may be chance all the same, of noise with so long a memory
+TOLD = 0.002  # of what the belief leaves beyond the noise: what a fault of the channel adds at the least
 NO_NOISE = 0.1  # of the noise power: what turns its sign with each sample is taken for some times as much noise
 RIVALS = 4  # models of the best single causes that are kept
 
@@ -159,8 +158,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
     if causes:
         verdict = "explained" if explains(left, causes, not search.reach.rich) else "unexplained"
     else:
-        beyond = excess[0] > TOLD * floor**2 or squares[0] > (1.0 + MUCH) * floor**2
-        verdict = "unexplained" if told and beyond else "consistent"
+        verdict = "unexplained" if told and speaks(excess[0], squares[0], floor) else "consistent"
     held_out_N = float(np.sqrt(squares[0] + apart)), float(np.sqrt(squares[-1]))
     floor = min(float(np.sqrt(prepared.floor_N**2 - prepared.felt_floor_N**2)), floor)
     saturated = flags.saturated.copy()

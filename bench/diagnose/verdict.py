@@ -21,6 +21,8 @@ from .way import TOLD_ONCE, most_sure
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
 SURELY = 4.0  # deviations by which the squares of two fits differ
 UNSEEN = 0.2  # of the noise power: what no test of structure sees of what is left; so far off may the noise be told
+SOME, MUCH = 0.002, 0.3  # of the noise power: what a test of structure sees something in; and that, though noise of a
+# long memory might have left as much
 TOLD_SIZE = 0.25  # of a cause's size, that its standard deviation may be for a sure name
 UNFELT = 16.0  # of χ²
 NOTHING = 0.1  # of its standard deviation, that a size is
@@ -110,6 +112,12 @@ def seen(excess: Sequence[float], floor_N: float) -> list[float]:
     too, of which the holds have told too little."""
     left = excess[-1] if excess[-1] < UNSEEN * floor_N**2 else 0.0
     return [max(e - left, 0.0) for e in excess]
+
+
+def speaks(excess_N2: float, square_N2: float, floor_N: float) -> bool:
+    """Whether what is left, of which no cause is named, is enough where a test of structure sees something in it: its
+    excess over what may be chance, or the mean square itself, for the test has reckoned with chance in its own way."""
+    return excess_N2 > SOME * floor_N**2 or square_N2 > (1.0 + MUCH) * floor_N**2
 
 
 def floor_told(before_N: float, after_N: float, left: float, floor_N: float) -> float:

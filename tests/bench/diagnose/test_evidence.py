@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from bench.diagnose.evidence import Evidence, threshold
-from bench.diagnose.verdict import explains
+from bench.diagnose.verdict import explains, speaks
 from tests.bench.diagnose.small import made_up
 
 
@@ -35,3 +35,18 @@ def test_half_sure_names_explain_nothing_where_depths_are_met_once(
 ) -> None:
     cause = replace(made_up().causes[0], gain=1.0, confidence=confidence)
     assert explains(0.0, [cause], once) is explained
+
+
+@pytest.mark.parametrize(
+    ("excess", "square", "enough"),
+    [
+        (0.01, 1.01, True),  # beyond chance
+        (0.0, 1.1, False),  # noise of a long memory leaves as much in one run and not in the next
+        (0.0, 1.6, True),  # and this, but a test that knows of that sees something
+    ],
+)
+def test_what_a_test_sees_is_unexplained_where_it_is_more_than_a_crumb(
+    excess: float, square: float, enough: bool
+) -> None:
+    floor_N = 0.02
+    assert speaks(excess * floor_N**2, square * floor_N**2, floor_N) is enough
