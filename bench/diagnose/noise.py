@@ -65,6 +65,14 @@ class Colour:
         """Samples that say the same as one, of a slow direction: 1 + 2 Σ ρ."""
         return 1.0 + 2.0 * sum(share * phi / (1.0 - phi) for share, phi in self.poles)
 
+    def memory_of(self, change: Array) -> float:
+        """The same of a change (n,) of a model's force, sample by sample: Σ ρ_(i−j) d_i d_j/Σ d²."""
+        power = max(float(np.sum(change * change)), 1e-300)
+        felt = change * (1.0 - sum(share for share, _ in self.poles))
+        for share, phi in self.poles:
+            felt = felt + share * (2.0 * lfilter([1.0], [1.0, -phi], change) - change)
+        return float(np.sum(felt * change)) / power
+
 
 @dataclass(frozen=True)
 class ForceNoise:

@@ -11,9 +11,10 @@ from .data import Data, Prepared
 from .evidence import CRUMB, RIVAL, tempered, unexplained
 from .held_out import held_out_square
 from .late import LATE
+from .noise import Colour
 from .numbers import Cause, shapes_of
 from .path import Measure, Path, Trial
-from .refit import Fit, force_at, reduced, refit
+from .refit import Fit, chi2, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
 from .search import Search
 from .way import TOLD_ONCE, most_sure
@@ -35,14 +36,17 @@ MANY = 3  # causes, as many as a search finds: so many together imitate what non
 
 def ordered(prepared: Prepared, fit: Fit, base: Fit, known: Sequence[Fit] = ()) -> Fit:
     """The causes in the order of what leaving each one out would cost, in χ²: what a mass feels of the encoder's noise
-    counts little. `known`: as in `without`."""
+    counts little. That of the noise's colour counts for nothing, as in what is stated of each. `known`: as in
+    `without`."""
     own = len(base.structure.causes)
     number = len(fit.structure.causes)
     if number - own < 2:
         return fit
+    plain = replace(prepared.short, colour=Colour())
     costs = []
     for index in range(own, number):
-        costs.append(without(prepared, fit, index, known, 15).chi2)
+        left = without(prepared, fit, index, known, 15)
+        costs.append(chi2(plain, left.structure, left.x))
     order = list(range(own)) + [own + int(k) for k in np.argsort(-np.array(costs), kind="stable")]
     structure = replace(fit.structure, causes=tuple(fit.structure.causes[i] for i in order))
     values = fit.structure.values(fit.x)
@@ -101,10 +105,22 @@ def excesses(prepared: Prepared, fits: Sequence[Fit], floor_N: float) -> tuple[l
         out.append(max(excess, 0.0) if joined or excess > doubt else 0.0)
     for k in range(len(fits) - 2, 0, -1):
         taken = squares[k] - squares[k + 1]
-        chance = 2.0 * floor_N * float(np.sqrt(max(taken, 0.0) * memory / n))  # 2 Σ e Δ/n, Δ between the two fits
-        if taken > max(SURELY * chance, CRUMB * floor_N**2):
+        if taken <= CRUMB * floor_N**2:
+            continue
+        chance = 2.0 * floor_N * float(np.sqrt(taken * _memory_of_step(prepared, fits[k], fits[k + 1]) / n))
+        if taken > SURELY * chance:  # of 2 Σ e Δ/n, Δ between the two fits
             out[k] = max(out[k], out[k + 1] + taken)
     return squares, out
+
+
+def _memory_of_step(prepared: Prepared, before: Fit, after: Fit) -> float:
+    """Samples that say the same as one of what the step from one fit to the next changes: noise of a long memory hides
+    what is slow, and not what is quick."""
+    full, colour = prepared.full, prepared.colour
+    if colour.memory == 1.0:
+        return 1.0
+    change = force_at(full, after.structure, after.x) - force_at(full, before.structure, before.x)
+    return colour.memory_of(change[full.weight > 0])
 
 
 def seen(excess: Sequence[float], floor_N: float) -> list[float]:

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from bench.diagnose import swing
 from bench.diagnose.channel import faults
 from bench.diagnose.diagnose import _apart
-from bench.diagnose.noise import _about_curve, _matched, force_noise
+from bench.diagnose.noise import Colour, _about_curve, _matched, force_noise
 from bench.recording.types import Measurement
 from tests.truth.cases import Case, draw_case
 
@@ -152,3 +152,14 @@ def test_levels_of_detail_that_few_samples_tell_are_left_out():
             parts.append(_about_curve(t, e))
         found = _matched(parts, 0.01)
         assert np.isfinite(found.air_N) and found.air_N > 0.2
+
+
+def test_the_memory_of_a_change_is_that_of_noise_along_it():
+    """Of a slow one nearly all of the noise's; of one that turns with each sample, less than white noise has."""
+    colour, n = Colour(((0.3, 0.8), (0.2, 0.98))), np.arange(400)
+    rho = 0.3 * 0.8 ** abs(n[:, None] - n) + 0.2 * 0.98 ** abs(n[:, None] - n) + 0.5 * np.eye(400)
+    for change in (np.ones(400), np.sin(0.3 * n), (-1.0) ** n, np.random.default_rng(1).standard_normal(400)):
+        wanted = change @ rho @ change / (change @ change)
+        assert colour.memory_of(change) == pytest.approx(wanted, rel=1e-9)
+    assert colour.memory_of(np.ones(400)) > 0.8 * colour.memory and colour.memory_of((-1.0) ** n) < 0.7
+    assert Colour().memory_of(np.sin(n)) == pytest.approx(1.0)

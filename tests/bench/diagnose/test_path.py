@@ -11,6 +11,7 @@ import pytest
 
 from bench.diagnose import evidence, verdict
 from bench.diagnose.evidence import TRACE, Evidence
+from bench.diagnose.noise import Colour
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.path import Measure, Path
 from bench.diagnose.result import Number
@@ -234,6 +235,21 @@ def test_what_a_later_fit_surely_takes_is_there_however_doubtful_the_floor_is(mo
     assert squares(monkeypatch, [2.0, 1.03, 1.00]) == pytest.approx([1.0, 0.03, 0.0])
     # a five-hundredth of the noise is none, and within the floor's doubt it stays nothing
     assert squares(monkeypatch, [2.0, 1.03, 1.0285]) == pytest.approx([1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("quick", "there"), [(True, 0.2), (False, 0.0)])
+def test_noise_of_a_long_memory_hides_what_is_slow_and_not_what_is_quick(monkeypatch, quick, there):
+    """The doubt about the floor is as large as what a cause takes: whether it does so by chance, its course tells."""
+    n, steps = np.arange(10_000), [2.0, 1.2, 1.0]
+    course = np.sin(n * (1.0 if quick else 1e-3))
+    monkeypatch.setattr(verdict, "held_out_square", lambda prepared, fit: fit.square)
+    monkeypatch.setattr(verdict, "_square_std", lambda prepared, fit: 0.3)
+    monkeypatch.setattr(verdict, "force_at", lambda full, structure, x: x * course)
+    colour = Colour(((0.25, 0.9), (0.25, 0.999)))
+    full = SimpleNamespace(weight=np.ones(n.size))
+    prepared: Any = SimpleNamespace(floor_square_std=0.3, colour=colour, full=full)
+    fits: list[Any] = [SimpleNamespace(free=3, square=s, structure=None, x=k) for k, s in enumerate(steps)]
+    assert verdict.excesses(prepared, fits, 1.0)[1] == pytest.approx([1.0, there, 0.0])
 
 
 def test_a_misfit_is_not_taken_for_noise_however_it_scatters(monkeypatch):
