@@ -100,7 +100,7 @@ def test_another_law_is_told_by_the_form_of_few_numbers(seed):
 
 def test_a_search_ends_with_its_work_and_not_with_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the machine does beside it, as much is simulated and the same is found."""
-    c = pair_case(1, ("stress_softening", "force_drift"), protocol="staircase", rate_hz=100.0, **QUIET)
+    c = pair_case(1, ("stress_softening", "force_drift"), protocol="staircase", rate_hz=60.0, **QUIET)
     found = []
     for most in (1, 1, 50_000_000):  # simulated samples
         monkeypatch.setattr("bench.diagnose.search.MOST_WORK", most)
@@ -330,16 +330,17 @@ def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_o
 
 @pytest.mark.parametrize(("seeds", "least"), [(3, 3), pytest.param(10, 8, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
-    ("id", "shape", "form"),
-    [("cogging", "current_sensors", "unbalanced"), ("sensor_lag", "oil_warms", "warming")],
+    ("id", "shape", "forms"),
+    [("cogging", "current_sensors", ("unbalanced", "uneven")), ("sensor_lag", "oil_warms", ("warming",))],
 )
-def test_a_form_with_a_long_way_to_go_is_not_left_behind(id, shape, form, seeds, least):
-    """Each form of a family is carried on for itself: here those that a part of the load or the time goes into."""
+def test_a_form_with_a_long_way_to_go_is_not_left_behind(id, shape, forms, seeds, least):
+    """Each form of a family is carried on for itself: here those that a part of the load, the way or the time goes
+    into."""
     found = []
     for seed in range(seeds):
         c = draw_case(seed, (id,), 2.0, shape, protocol="staircase", rate_hz=150.0, noise_N=0.003, **QUIET)
         search, _, fit = in_two_shapes(c, id)
-        found.append(fit.structure.causes[0].form.name == form and fit.chi2 < 1.3 * search.expected)
+        found.append(fit.structure.causes[0].form.name in forms and fit.chi2 < 1.1 * search.expected)
     assert sum(found) >= least
 
 
