@@ -35,9 +35,7 @@ def test_noise_of_any_kind_is_told_by_the_holds(kind):
         assert _told(draw_case(seed, (), noise_kind=kind, own_clock=False)) == pytest.approx(1.0, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    "width", [3, 7, pytest.param(5, marks=pytest.mark.long), pytest.param(12, marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("width", [3, *(pytest.param(w, marks=pytest.mark.long) for w in (5, 7, 12))])
 def test_noise_of_a_running_mean_forgets_all_at_once(width: int) -> None:
     """It has less power than what fades has where that is slow, which would be taken for something beside the noise."""
     told = []

@@ -46,8 +46,10 @@ def test_what_is_believed_is_consistent_with_its_simulation(padbench):
     ("effect", "form", "name"),
     [
         ({"id": "friction", "coulomb": 0.05}, "coulomb", "coulomb"),
-        ({"id": "frame_compliance", "compliance": 0.005}, "linear", "compliance"),
-        ({"id": "force_bias", "bias": 0.05}, "constant", "bias"),
+        pytest.param(
+            *({"id": "frame_compliance", "compliance": 0.005}, "linear", "compliance"), marks=pytest.mark.long
+        ),
+        pytest.param(*({"id": "force_bias", "bias": 0.05}, "constant", "bias"), marks=pytest.mark.long),
         ({"id": "backlash", "gap": 0.02}, "play", "gap"),
     ],
 )

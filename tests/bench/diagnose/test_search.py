@@ -98,17 +98,26 @@ def test_another_law_is_told_by_the_form_of_few_numbers(seed):
     assert trial.fit.chi2 < 1.05 * search.expected
 
 
+def _worked(monkeypatch: pytest.MonkeyPatch, most: int) -> tuple[int, list[str], float]:
+    """Samples simulated by a search that may simulate so many, what it finds, and what that leaves."""
+    c = pair_case(1, ("stress_softening", "force_drift"), protocol="staircase", rate_hz=60.0, **QUIET)
+    monkeypatch.setattr("bench.diagnose.search.MOST_WORK", most)
+    search, base = begun(c)
+    end = search.path(base).fits[-1]
+    return search.work, [cause.id for cause in end.structure.causes], end.chi2
+
+
 def test_a_search_ends_with_its_work_and_not_with_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the machine does beside it, as much is simulated and the same is found."""
-    c = pair_case(1, ("stress_softening", "force_drift"), protocol="staircase", rate_hz=60.0, **QUIET)
-    found = []
-    for most in (1, 1, 50_000_000):  # simulated samples
-        monkeypatch.setattr("bench.diagnose.search.MOST_WORK", most)
-        search, base = begun(c)
-        end = search.path(base).fits[-1]
-        found.append((search.work, [cause.id for cause in end.structure.causes], end.chi2))
-    assert found[0] == found[1] and len(found[0][1]) == 1
-    assert sorted(found[2][1]) == ["force_drift", "stress_softening"] and found[2][2] < found[0][2]
+    once, again = _worked(monkeypatch, 1), _worked(monkeypatch, 1)
+    assert once == again and len(once[1]) == 1
+
+
+@pytest.mark.long
+def test_with_more_work_a_search_finds_what_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    work, ids, left = _worked(monkeypatch, 50_000_000)
+    assert sorted(ids) == ["force_drift", "stress_softening"]
+    assert left < _worked(monkeypatch, 1)[2] < np.inf and work < 60_000_000
 
 
 def test_where_a_model_runs_away_its_error_has_no_end_and_no_step_is_taken_there():

@@ -29,7 +29,7 @@ def louder(case: Case, seed: int, air_N: float, share: float):
     return replace(measurement(case), force_N=clean + noise)
 
 
-@pytest.mark.parametrize("ratio", [2.0, 4.0])
+@pytest.mark.parametrize("ratio", [2.0, pytest.param(4.0, marks=pytest.mark.long)])
 def test_how_much_of_the_force_is_noise(ratio: float) -> None:
     """Within a tenth in 17 of 20 runs, in air and under load."""
     near = 0
@@ -42,7 +42,9 @@ def test_how_much_of_the_force_is_noise(ratio: float) -> None:
     assert near >= 17
 
 
-@pytest.mark.parametrize("kind", ["white", "coloured", "quantised", "heavy"])
+@pytest.mark.parametrize(
+    "kind", ["white", "coloured", *(pytest.param(k, marks=pytest.mark.long) for k in ("quantised", "heavy"))]
+)
 def test_noise_of_other_kinds_does_not_grow(kind: str) -> None:
     for seed in SEEDS:
         m = measurement(quiet(seed, noise_kind=kind, position_noise_mm=0.001))
