@@ -395,7 +395,7 @@ def test_what_sways_at_a_frequency_of_its_own_is_seen_and_noise_is_not():
         assert found.share == pytest.approx(1.5**2 / (1.0 + 1.5**2), abs=0.12)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3))])
 def test_what_turns_its_sign_from_sample_to_sample_is_seen(seed):
     """Two gauges read in turn, one of which is out by some of the force: at half the rate, at which no hum is here."""
     c = draw_case(seed, (), noise_kind="white", jitter="none", protocol="staircase", rate_hz=170.0)

@@ -71,7 +71,7 @@ def test_nothing_tells_of_the_noise_of_a_coarse_channel_at_rest():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, *(pytest.param(s, marks=pytest.mark.long) for s in (3, 4, 5, 6))])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3, 4, 5, 6))])
 def test_a_force_that_stands_in_a_wide_step_is_not_stuck(seed):
     """Pressed to and fro without end most neighbours differ; where the axis rests, noise of a fifth of a step is
     nowhere near its edges."""

@@ -75,7 +75,7 @@ def test_what_swings_in_the_holds_alone_is_no_hum(seed):
             assert found.structure.values(found.x)[-1]["amplitude"] == pytest.approx(size_N, rel=0.1)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2, 3))])
 def test_hum_by_a_clock_that_wanders_is_found_once_the_clock_is_known(seed: int) -> None:
     """Its stamps smear the line, and what is found of it is little."""
     m = measurement(draw_case(seed, (), noise_kind="white", noise_N=0.004, rate_hz=400.0, own_clock=False))

@@ -91,7 +91,10 @@ def test_a_force_that_is_felt_at_uncertain_times_is_no_louder() -> None:
         assert told(replace(m, force_N=force)) == 1.0
 
 
-@pytest.mark.parametrize(("make", "words"), [(shaken, "as noisy in motion"), (pumped, "as noisy as at others")])
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [(shaken, "as noisy in motion"), pytest.param(pumped, "as noisy as at others", marks=pytest.mark.long)],
+)
 def test_it_is_no_cause_and_is_said(make: Callable[[Case, int, float], Measurement], words: str) -> None:
     consistent = 0
     for seed in range(3):

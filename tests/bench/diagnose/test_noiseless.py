@@ -50,7 +50,7 @@ def test_what_is_believed_is_consistent_with_its_simulation(padbench):
             *({"id": "frame_compliance", "compliance": 0.005}, "linear", "compliance"), marks=pytest.mark.long
         ),
         pytest.param(*({"id": "force_bias", "bias": 0.05}, "constant", "bias"), marks=pytest.mark.long),
-        ({"id": "backlash", "gap": 0.02}, "play", "gap"),
+        pytest.param(*({"id": "backlash", "gap": 0.02}, "play", "gap"), marks=pytest.mark.long),
     ],
 )
 def test_what_was_hidden_in_a_simulation_is_named_in_its_plain_form(padbench, effect, form, name):

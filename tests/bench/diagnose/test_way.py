@@ -52,7 +52,7 @@ def test_the_share_of_the_forces_that_are_felt_on_the_way(hold_s, share):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2, *(pytest.param(s, marks=pytest.mark.long) for s in (3, 4, 5, 6))])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3, 4, 5, 6))])
 def test_a_short_ripple_is_found_where_the_pad_is_pressed_to_and_fro(seed):
     """Held at some depths, any ripple that is short enough has what is there; on the way between them one alone has."""
     rng, path = np.random.default_rng(seed), Path(-0.5, 3000.0).hold(1.0)
