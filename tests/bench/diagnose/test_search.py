@@ -419,8 +419,8 @@ def test_where_all_that_was_found_goes_another_cause_may_begin(monkeypatch, seed
     assert result.causes and result.causes[0].gain > 0.5
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_further_cause_is_held_against_its_rivals_in_the_shape_that_it_has_in_the_end(seed):
     """It came in as a dashpot that grows with the depth, which others nearly are; a filling met at a depth none is."""
     told = {"viscous_damping": "inner_cell"}
