@@ -199,6 +199,14 @@ class TestPeriodic:
         force = simulate(AIR, [active("cogging", "swelling", **numbers)], x + 5, x)
         assert_allclose(force, 0.2 * (1 + 0.1 * (x - 1)) * np.sin(2 * np.pi * x / 1.6 + 0.3), atol=1e-14)
 
+    def test_cogging_of_three_harmonics_that_grows_along_the_way(self) -> None:
+        x = np.linspace(0.0, 3.0, 61)
+        told = {"amplitude": 0.1, "period": 0.9, "phase": 0.3, "ratio": 0.5, "second_phase": 1.1, "third_ratio": 0.2}
+        uneven = active("cogging", "uneven", **told, third_phase=-0.4, growth=0.3, at_depth=1.5)
+        theta = 2 * np.pi * x / 0.9
+        wave = np.sin(theta + 0.3) + 0.5 * np.sin(2 * theta + 1.1) + 0.2 * np.sin(3 * theta - 0.4)
+        assert_allclose(simulate(AIR, [uneven], x, x), 0.1 * (1 + 0.3 * (x - 1.5)) * wave, atol=1e-12)
+
     def test_a_ripple_of_two_periods(self) -> None:
         x = np.linspace(-5.0, -1.0, 801)
         numbers = {"amplitude": 0.2, "period": 1.6, "phase": 0.3, "ratio": 0.4, "order": 1.5, "second_phase": 1.0}

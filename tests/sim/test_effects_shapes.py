@@ -307,15 +307,6 @@ def test_a_zero_that_is_late_to_come_back() -> None:
     assert_allclose(np.interp([5.0, 15.0, 25.0], t, zero), wanted, atol=1e-3)
 
 
-def test_cogging_of_three_harmonics_that_grows_along_the_way() -> None:
-    x = np.linspace(0.0, 3.0, 61)
-    told = {"amplitude": 0.1, "period": 0.9, "phase": 0.3, "ratio": 0.5, "second_phase": 1.1, "third_ratio": 0.2}
-    uneven = active("cogging", "uneven", **told, third_phase=-0.4, growth=0.3, at_depth=1.5)
-    theta = 2 * math.pi * x / 0.9
-    wave = np.sin(theta + 0.3) + 0.5 * np.sin(2 * theta + 1.1) + 0.2 * np.sin(3 * theta - 0.4)
-    assert_allclose(simulate(AIR, [uneven], x, x), 0.1 * (1 + 0.3 * (x - 1.5)) * wave, atol=1e-12)
-
-
 def test_play_of_what_works_loose() -> None:
     loose = active("backlash", "wearing", gap=0.1, growth=0.02, at_time=20.0)
     x = np.interp(np.arange(40.0), [0.0, 5.0, 10.0, 30.0, 35.0, 39.0], [0.0, 1.0, 0.0, 0.0, 1.0, 0.2])
