@@ -37,10 +37,11 @@ PLACES = (
     "rate",
     "contact",
     "gap",
+    "load",
     "sensor",
     "sampling",
 )
-REPORT, PLAY, FRAME, PROBE, DEPTH, LAW, ELASTIC, RATE, CONTACT, GAP, SENSOR, SAMPLING = range(12)
+REPORT, PLAY, FRAME, PROBE, DEPTH, LAW, ELASTIC, RATE, CONTACT, GAP, LOAD, SENSOR, SAMPLING = range(13)
 
 # program: sizes and offsets, where each place's blocks start, then (address, state, parameters) a block
 MODES, UNILATERAL, FILM, ONCE, BONDED, INNER, INNER_SIZE, TRIAL, SCRATCH, RELAX, CACHE, STARTS = range(12)
@@ -309,6 +310,7 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
     state[pad + PAD_DEPTH] = depth
     state[pad + PAD_FORCE] = F
     state[pad + SURFACE] = surface
+    F += total(program, params, state, shift, LOAD, dt, F)
     return float(F + total(program, params, state, shift, PROBE, dt, y))
 
 

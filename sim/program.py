@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SOLVED = ("frame", "probe", "depth", "elastic", "rate", "contact", "gap")
+SOLVED = ("frame", "probe", "depth", "elastic", "rate", "contact", "gap", "load")
 """Places inside the loop between frame and cell."""
 
 

@@ -14,11 +14,12 @@ parameters and supplies steps (sim.jit.block) for one or several places:
 | rate | depth, mm → factor on all rates | multiplied |
 | contact | depth, mm → force of the pad's own, N | added while in contact; with it, too, the pad cannot pull |
 | gap | gap between pad and probe, mm (0 in contact) → force, N | added between the two: may pull |
+| load | force of the pad on the probe, N → force, N | added to it; or 0, where a block only notes it for `probe` |
 | sensor | force at the cell → force in the path, N | chained, on the whole time grid |
 | sampling | force → force as reported, N | chained, once a force sample |
 
 All blocks of one effect share one state vector, which starts as `state`, and one parameter vector: the form's
-parameters in their order, or what `pack` makes of them. A step from `frame` to `gap` is run several times on trial
+parameters in their order, or what `pack` makes of them. A step from `frame` to `load` is run several times on trial
 copies of the state, so it may keep nothing elsewhere. A step must take dt = 0 (the first sample of all, and stamps that
 repeat).
 """

@@ -8,6 +8,9 @@
   differ (S. Chen, C. Namuduri, S. Mir, Controller-induced parasitic torque ripples in a PM synchronous motor, IEEE
   Trans. Ind. Appl. 38, 2002, 1273–1281).
 - `swelling`: the sine grows along the way, as towards the end of the magnets: amplitude · (1 + growth (y − at_depth)).
+- `driven`: the sine grows with the force of the pad, which the motor bears: amplitude · (1 + growth · |F|), the ripple
+  of the thrust beside that of the magnets (N. Bianchi, S. Bolognani, A. D. F. Cappello, Reduction of cogging force in
+  PM linear motors by pole-shifting, IEE Proc. Electr. Power Appl. 152, 2005, 703–709).
 - `uneven`: as `swelling`, of the sine with its second and third harmonic: edges of slots, in a row that ends.
 - `trailing`: the sine of a place that is dragged along, as iron's field is behind the magnets': the middle of a play of
   the full width `trail`.
@@ -68,6 +71,19 @@ def unbalanced(dt: float, y: float, state: State, p: State) -> float:
 def swelling(dt: float, y: float, state: State, p: State) -> float:
     """Force in N; p = (amplitude, period, phase, growth, at_depth)."""
     return p[0] * (1.0 + p[3] * (y - p[4])) * math.sin(2.0 * math.pi * y / p[1] + p[2])
+
+
+@block
+def note_load(dt: float, force: float, state: State, p: State) -> float:
+    """Adds nothing to the pad's force, and notes it."""
+    state[0] = abs(force)
+    return 0.0
+
+
+@block
+def driven(dt: float, y: float, state: State, p: State) -> float:
+    """Force in N; p = (amplitude, period, phase, growth); state: the pad's force."""
+    return p[0] * (1.0 + p[3] * state[0]) * math.sin(2.0 * math.pi * y / p[1] + p[2])
 
 
 @block
@@ -217,6 +233,19 @@ EFFECT = Effect(
             what="a sine that grows along the way",
             parameters=(_AMPLITUDE, _PERIOD, PHASE, *GROWTH),
             blocks={"probe": swelling},
+        ),
+        Form(
+            name="driven",
+            what="a sine that grows with the force of the pad",
+            parameters=(
+                _AMPLITUDE,
+                _PERIOD,
+                PHASE,
+                Parameter("growth", "1/N", 0.0, 1000.0, 0.5, "relative growth per N", starts=(0.1, 1.0)),
+            ),
+            sought=False,
+            blocks={"load": note_load, "probe": driven},
+            state=(0.0,),
         ),
         Form(
             name="uneven",

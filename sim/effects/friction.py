@@ -15,6 +15,8 @@ since the last reversal, rises with it, and is a continuous function of position
 
 - `load_dependent`: Prandtl's element whose slider holds F_c (1 + load · δ): guides and seals that bear more the deeper
   the probe stands in the pad (F. P. Bowden, D. Tabor, The Friction and Lubrication of Solids, Oxford, 1950).
+- `pressed`: Prandtl's element whose slider holds F_c (1 + load · |F|), F the pad's force: a joint that bears what is
+  pressed, by Amontons' law (Bowden, Tabor, the same).
 - `maxwell_slip`: five of Prandtl's elements side by side, their distances spread geometrically: the build-up is gradual
   and remembers inner loops (W. D. Iwan, J. Appl. Mech. 33, 1966, 893–900).
 - `worked_in`: Prandtl's element whose slider holds F_c (1 + stiffness s): grease that has lain is stiffer, gets worked
@@ -48,207 +50,28 @@ State: last position, force, whether there was a position yet. A first position 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from functools import partial
 
 from sim.effects.base import Effect, Form, Parameter
+from sim.effects.sliders import (
+    by_speed,
+    coulomb,
+    dahl,
+    load_dependent,
+    logarithmic,
+    maxwell_slip,
+    note_depth,
+    note_load,
+    one_way,
+    smoothed,
+    stribeck,
+    swelling,
+    tight,
+    uneven,
+    worked_in,
+)
 from sim.effects.waves import phase
-from sim.jit import State, block
-
-_LAST, _FORCE, _STARTED, _DEPTH = range(4)
-_GREASE = 3
-_CREEP_MM_S = 0.1
-"""Speed below which `logarithmic` falls no further."""
-_FIRST, _ELEMENTS = 3, 5
-
-
-@block
-def coulomb(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element; p = (coulomb, presliding)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    force = state[_FORCE] + moved * (p[0] / p[1])
-    force = max(-p[0], min(p[0], force))
-    state[_FORCE] = force
-    return force
-
-
-@block
-def dahl(dt: float, y: float, state: State, p: State) -> float:
-    """Dahl's model over the distance moved; p = (coulomb, presliding)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    ceiling = p[0] if moved >= 0.0 else -p[0]
-    force = state[_FORCE] + (ceiling - state[_FORCE]) * -math.expm1(-abs(moved) / p[1])
-    state[_FORCE] = force
-    return force
-
-
-@block
-def maxwell_slip(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's elements side by side, of equal strength; p = (coulomb, presliding, spread)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    limit = p[0] / _ELEMENTS
-    total = 0.0
-    for k in range(_ELEMENTS):
-        reach = p[1] * p[2] ** (k - 0.5 * (_ELEMENTS - 1))
-        force = state[_FIRST + k] + moved * (limit / reach)
-        force = max(-limit, min(limit, force))
-        state[_FIRST + k] = force
-        total += force
-    return total
-
-
-@block
-def stribeck(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element with a slider that depends on speed.
-
-    p = (coulomb, static_ratio, stribeck_speed, viscous, presliding).
-    """
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    speed = abs(moved) / dt if dt > 0.0 else 0.0
-    limit = p[0] * (1.0 + (p[1] - 1.0) * math.exp(-((speed / p[2]) ** 2)))
-    force = state[_FORCE] + moved * (p[0] / p[4])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    viscous = p[3] * moved / dt if dt > 0.0 else 0.0
-    return force + viscous
-
-
-@block
-def note_depth(dt: float, depth: float, state: State, p: State) -> float:
-    """Leaves the depth as it is, and notes it for the friction."""
-    state[_DEPTH] = max(depth, 0.0)
-    return depth
-
-
-@block
-def load_dependent(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element with a slider that depends on depth; p = (coulomb, load, presliding)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    limit = p[0] * (1.0 + p[1] * state[_DEPTH])
-    force = state[_FORCE] + moved * (limit / p[2])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
-
-
-@block
-def worked_in(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element behind grease; p = (coulomb, stiffness, way, rest, presliding); state: the grease's too."""
-    if state[_STARTED] == 0.0:
-        state[_STARTED] = 1.0
-        state[_LAST] = y
-        state[_GREASE] = 1.0
-    moved = y - state[_LAST]
-    state[_LAST] = y
-    back, gone = dt / p[3], abs(moved) / p[2]
-    if back + gone > 0.0:  # exact where speed is constant
-        settled = back / (back + gone)
-        state[_GREASE] = settled + (state[_GREASE] - settled) * math.exp(-back - gone)
-    limit = p[0] * (1.0 + p[1] * state[_GREASE])
-    force = max(-limit, min(limit, state[_FORCE] + moved * (limit / p[4])))
-    state[_FORCE] = force
-    return force
-
-
-@block
-def uneven(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element over uneven ground; p = (coulomb, sine_1, cosine_1, sine_2, cosine_2, reach, presliding)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    angle = 2.0 * math.pi * y / p[5]
-    more = p[1] * math.sin(angle) + p[2] * math.cos(angle) + p[3] * math.sin(2.0 * angle) + p[4] * math.cos(2.0 * angle)
-    limit = p[0] * max(1.0 + more, 0.0)
-    force = state[_FORCE] + moved * (p[0] / p[6])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
-
-
-@block
-def tight(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element over a rail with a tight place; p = (coulomb, more, place, width, presliding)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    away = (y - p[2]) / p[3]
-    limit = p[0] * (1.0 + p[1] * math.exp(-away * away))
-    force = state[_FORCE] + moved * (p[0] / p[4])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
-
-
-@block
-def swelling(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element whose limit swells along the way; p = (coulomb, swell, turn, angle, presliding)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    limit = p[0] * (1.0 + p[1] * math.sin(2.0 * math.pi * y / p[2] + p[3]))
-    force = state[_FORCE] + moved * (p[0] / p[4])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
-
-
-@block
-def logarithmic(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element with a slider that depends on speed; p = (coulomb, growth, presliding)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    speed = abs(moved) / dt if dt > 0.0 else 0.0
-    limit = p[0] * max(1.0 + p[1] * math.log((_CREEP_MM_S + speed) / (_CREEP_MM_S + 1.0)), 0.0)
-    force = state[_FORCE] + moved * (p[0] / p[2])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
-
-
-@block
-def one_way(dt: float, y: float, state: State, p: State) -> float:
-    """Prandtl's element with a slider for each way; p = (coulomb, differs, presliding)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    force = state[_FORCE] + moved * (p[0] / p[2])
-    force = max(-p[0] * (1.0 - p[1]), min(p[0] * (1.0 + p[1]), force))
-    state[_FORCE] = force
-    return force
-
-
-@block
-def smoothed(dt: float, y: float, state: State, p: State) -> float:
-    """A tanh of the speed; p = (coulomb, speed)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    return p[0] * math.tanh(moved / (dt * p[1])) if dt > 0.0 else 0.0
-
-
-@block
-def by_speed(dt: float, y: float, state: State, p: State) -> float:
-    """The Stribeck curve; p = (coulomb, static_ratio, stribeck_speed, viscous, speed)."""
-    moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
-    state[_STARTED] = 1.0
-    state[_LAST] = y
-    if dt <= 0.0:
-        return 0.0
-    v = moved / dt
-    level = p[0] * (1.0 + (p[1] - 1.0) * math.exp(-((v / p[2]) ** 2)))
-    return level * math.tanh(v / p[4]) + p[3] * v
 
 
 def _term(name: str, what: str) -> Parameter:
@@ -375,6 +198,18 @@ EFFECT = Effect(
                 _PRESLIDING,
             ),
             blocks={"depth": note_depth, "probe": load_dependent},
+            state=(0.0, 0.0, 0.0, 0.0),
+        ),
+        Form(
+            name="pressed",
+            what="grows with the force of the pad",
+            parameters=(
+                _COULOMB,
+                Parameter("load", "1/N", 0.0, 1000.0, 0.5, "relative growth per N", starts=(0.1, 1.0)),
+                _PRESLIDING,
+            ),
+            sought=False,
+            blocks={"load": note_load, "probe": load_dependent},
             state=(0.0, 0.0, 0.0, 0.0),
         ),
         Form(

@@ -136,7 +136,23 @@ class TestFriction:
         up, down = force[:2001], force[:1999:-1]
         assert_allclose((up - down)[100:1900], 2 * 0.05 * (1 + 0.5 * x[100:1900]), rtol=1e-9)
 
-    @pytest.mark.parametrize("form", ["coulomb", "presliding", "stribeck", "load_dependent", "one_way"])
+    def test_what_goes_with_the_load_knows_the_force_of_the_pad_that_relaxes_and_that_of_a_frame(self) -> None:
+        t = np.arange(4001) * 1e-3
+        x = np.where(t < 2.0, t, 4.0 - t)
+        pad = Pad(Exponential(2.0, 0.5), Relaxation((0.3,), (2.0,)), True)
+        for beside in ([], [active("frame_compliance", compliance=0.01)]):
+            load = Cascade(pad, beside).simulate(t, x)
+            y = x - 0.01 * load if beside else x
+            friction = active("friction", "pressed", coulomb=0.05, load=0.4, presliding=1e-5)
+            drag = 0.05 * (1 + 0.4 * load) * np.where(t <= 2.0, 1.0, -1.0)
+            cell = Cascade(pad, [*beside, friction]).simulate(t, x + (0.01 * drag if beside else 0.0))
+            assert_allclose((cell - load - drag)[[500, 1500, 3000]], 0.0, atol=1e-9 if not beside else 2e-5)
+            cogging = active("cogging", "driven", amplitude=0.05, period=0.3, phase=0.2, growth=0.4)
+            wave = 0.05 * (1 + 0.4 * load) * np.sin(2 * np.pi * y / 0.3 + 0.2)
+            cell = Cascade(pad, [*beside, cogging]).simulate(t, x + (0.01 * wave if beside else 0.0))
+            assert_allclose(cell - load, wave, atol=1e-12)
+
+    @pytest.mark.parametrize("form", ["coulomb", "presliding", "stribeck", "load_dependent", "pressed", "one_way"])
     def test_a_closed_loop_takes_energy(self, form: str) -> None:
         x = np.concatenate([0.4 * np.sin(np.linspace(0, 2 * np.pi, 3001)) + 0.5] * 2)
         force = simulate(AIR, [active("friction", form)], np.arange(x.size) * 1e-3, x)

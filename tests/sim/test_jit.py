@@ -9,7 +9,7 @@ import pytest
 
 import sim
 from sim import jit
-from sim.effects.friction import coulomb
+from sim.effects.sliders import coulomb
 
 SIM = Path(sim.__file__).parent
 
