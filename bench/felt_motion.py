@@ -31,6 +31,9 @@ BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
 TOGETHER = 20  # samples that share the error of a window, about
 ASTRAY = 1.4  # times what noise makes of a window's value: so far off is it, in sines of any speed
 WIDTH = 2.2  # standard deviations on either side of a value
+ODD_STEPS = (
+    0.05  # share of the steps between the values of a coarse channel that may be less: some values are not its own
+)
 
 
 @compiled("void(float64[::1], float64[::1], float64, float64, int64[::1], int64, float64[::1], float64[::1])")
@@ -101,7 +104,8 @@ def resolution(values: Array) -> float:
     if levels.size < 2 or levels.size > 0.3 * values.size:
         return 0.0
     steps = np.diff(levels)
-    return float(np.min(steps[steps > 1e-9 * np.ptp(values)], initial=np.ptp(values)))
+    steps = steps[steps > 1e-9 * np.ptp(values)]
+    return float(np.quantile(steps, ODD_STEPS, method="lower")) if steps.size else float(np.ptp(values))
 
 
 def position_noise(position_mm: Array) -> float:

@@ -52,7 +52,8 @@ def noise_steps(force: Array, step_N: float) -> float:
     slow = moving[np.argsort(way[moving], kind="stable")][:count]  # where noise counts the most
     if len(slow) < FEWEST:
         return float("nan")
-    return float(0.5 * np.sqrt(np.pi * max(np.mean(crossed[slow] ** 2 - way[slow] ** 2), 0.0)))
+    middle = float(np.median(crossed[slow] ** 2 - way[slow] ** 2))  # whatever a stray reading makes of some windows
+    return float(0.5 * np.sqrt(np.pi * max(middle, 0.0)))
 
 
 def rounded(force: Array, step_N: float) -> float:

@@ -157,7 +157,9 @@ def explains(left: float, causes: Sequence[CauseFound], once: bool = False) -> b
     """Whether causes explain an error of which a share is left: they may leave less, the less sure they are, but for
     those that take next to nothing; and many of them, of which one is hardly sure, explain nothing. Nor does a name
     that acts with the motion where that went one way `once`: it has not beaten an odd pad, which no list of causes
-    has."""
+    has. Nor do causes of which one alone leaves as much again as there was: they but stand against each other."""
+    if min((c.gain for c in causes), default=0.0) < -1.0:
+        return False
     sure = min((max(c.confidence, c.of_its_kind) for c in causes if c.gain >= SLIGHT), default=1.0)
     if len(causes) >= MANY and sure < HARDLY or once and sure <= TOLD_ONCE:
         return False

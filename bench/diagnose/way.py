@@ -17,15 +17,16 @@ if TYPE_CHECKING:
 
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich which come back
 AGAIN = 2  # times that a depth is held again, after another one, which do as well
-LEAST = 0.05  # of the travel: less is no way, nor another level
+LEAST = 0.05  # of the greatest depth: less is no way, nor another level
 MOVES = 0.2  # of the mean speed over all of the run
 TOLD_ONCE = 0.5  # how sure a name can be of what acts with the motion, where data are not rich
 
 
 def is_rich(data: Data) -> bool:
-    """Whether a measurement comes back, and holds several depths, or some again, or passes over it several times."""
+    """Whether a measurement comes back, and holds several depths, or some again, or passes over it several times. The
+    way above the surface tells nothing of a pad."""
     counted = data.weight > 0
-    x = data.position_mm
+    x = np.maximum(data.position_mm, 0.0)
     span = float(np.ptp(x[counted])) if counted.any() else 0.0
     if span <= 0.0 or _passes(x, LEAST * span) < 2:
         return False

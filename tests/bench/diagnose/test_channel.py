@@ -82,6 +82,21 @@ def test_a_fine_scale_with_a_few_values_between_its_steps_repeats_itself_by_chan
         assert not faults(force).stuck.any()
 
 
+def test_a_coarse_channel_that_loses_digits_does_not_stick():
+    for seed in SEEDS:  # a tenth of a reading is no multiple of the step
+        rng = np.random.default_rng(seed)
+        t = np.arange(0.0, 21.5, 1 / 600.0)
+        ends = np.concatenate([[-0.5], *([0.2, 0.7 + 0.1 * k] for k in range(31)), [0.2]])
+        depth = np.maximum(np.interp(t, 2.0 + np.cumsum(np.abs(np.diff(ends, prepend=-0.5))) / 8.0, ends), 0.0)
+        clean_N = 0.5 * np.expm1(1.2 * depth)
+        force = 0.02 * np.round((clean_N + 0.0094 * rng.standard_normal(t.size)) / 0.02)
+        lost = rng.random(t.size) < 0.0025
+        force[lost] *= rng.choice([0.1, 10.0, -1.0], lost.sum())
+        found = faults(force)
+        assert not (found.stuck & ~lost).any()
+        assert (found.outlier & lost).sum() > 0.5 * (lost & (clean_N > 0.5)).sum()
+
+
 def _scored(said: np.ndarray, true: np.ndarray) -> tuple[float, float]:
     """(precision, recall) of samples (n,)."""
     hits = float((said & true).sum())

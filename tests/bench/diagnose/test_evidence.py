@@ -27,6 +27,12 @@ def test_what_takes_next_to_nothing_leaves_the_rest_as_explained_as_it_is() -> N
         assert explains(0.19, [first, replace(first, gain=gain, confidence=0.65)]) is explained
 
 
+@pytest.mark.parametrize(("alone", "explained"), [(-0.5, True), (-19.0, False)])
+def test_causes_that_stand_against_each_other_explain_nothing(alone: float, explained: bool) -> None:
+    first = replace(made_up().causes[0], gain=alone, confidence=0.9)
+    assert explains(0.0, [first, replace(first, gain=1.0 - alone)]) is explained
+
+
 @pytest.mark.parametrize(
     ("once", "confidence", "explained"), [(False, 0.5, True), (True, 0.5, False), (True, 0.9, True)]
 )

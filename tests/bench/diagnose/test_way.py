@@ -40,6 +40,7 @@ def data(levels_mm: list[float], hold_s: float = 1.0) -> Data:
         ([0.7, 1.4, 2.0, 0.0], False),
         ([0.7, 1.4, 2.0, 1.4, 0.7, 0.0], True),
         ([0.7, 1.4, 2.0, 2.01, 1.99, 0.7, 0.0], False),
+        ([-3.0, 0.5, 2.0, 1.8, 1.0, 0.0], True),
     ],
 )
 def test_several_depths_held_or_passes_make_data_rich_that_come_back(levels_mm, rich):
