@@ -160,6 +160,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         starts = tuple(share * reach.depth_mm for share in BENDS_AT) if p.bend else starts
     elif p.name == "at_depth":
         default = 0.5 * reach.depth_mm
+    elif p.name == "at_load":
+        default = 0.5 * reach.force_N
     elif p.name == "at_swing":
         default = 0.03 * reach.force_N
     elif p.name == "at_change":

@@ -6,7 +6,7 @@ For given periods a sine and a second one are linear in four numbers, so that on
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,14 @@ def ripples(form: Form) -> bool:
 def two_periods(form: Form) -> bool:
     """Whether a form repeats in two ways, of which one has so many waves for each of the other."""
     return ripples(form) and any(p.name == "order" for p in form.parameters)
+
+
+def merged(form: Form, values: Mapping[str, float], travel_mm: float) -> bool:
+    """Whether two waves of a form are hardly apart, and less than a beat over the travel: they are one that swells, and
+    their sizes tell of each other alone."""
+    if not two_periods(form) or not 1.0 / APART < values["order"] < APART:
+        return False
+    return abs(values["order"] - 1.0) * travel_mm < values["period"]
 
 
 def turned(cause: Cause) -> list[Cause]:

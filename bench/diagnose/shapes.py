@@ -18,7 +18,7 @@ from .modes import as_believed, missing_told
 from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, chi2, reduced, refit
-from .ripple import ripples
+from .ripple import merged, ripples
 from .way import is_rich
 
 Array = NDArray[np.float64]
@@ -30,6 +30,7 @@ FEW, TRIED = 3, 2  # steps of the best starts
 NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
 AS_GOOD = 4.0  # Δχ² by which one that is near to what was believed may be worse
+HARDLY_WORSE = 25.0  # Δχ² by which one wave that swells may be worse than two
 LEFT = 1.03  # times the noise power: what leaves more may have a period beyond those sought
 IN_STEP = 0.3  # of the position's power, that is at a frequency: then the motion swings with it
 EDGE = 1e-6  # within which a coordinate is at its bound
@@ -125,8 +126,19 @@ def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
             if not departed(short, other, index):
                 taken = other
                 break
-        taken = _longer(short, taken, index)
+        taken = _longer(short, _apart(short, taken, index, members[1:count]), index)
     return fit if taken is lead else taken
+
+
+def _apart(short: Data, fit: Fit, index: int, others: Sequence[Member]) -> Fit:
+    """The fit; or, where a cause of it is two waves that are one which swells, with the best of its other shapes, of
+    whatever period, if that is hardly worse: of two such waves no number is told."""
+    if not _merged(short, fit, index) or not others:
+        return fit
+    best = others[int(np.argmin(scores(short, others)))].fit
+    single = _longer(short, refit(short, best.structure, best.x, END, 1e-8), index)
+    apart, together = scores(short, [Member(single, index), Member(fit, index)])
+    return single if apart < together + HARDLY_WORSE else fit
 
 
 def steadier(short: Data, fit: Fit, own: int = 0) -> Fit:
@@ -179,12 +191,17 @@ def _in_place(fit: Fit, index: int, cause: Cause, pad: Array) -> tuple[Structure
 def departed(short: Data, fit: Fit, index: int) -> bool:
     """Whether a cause is another's shape, of which this one makes what it can: it differs from the first of its family
     by as much as the family allows (a number of either sign, 0 by default, at its bound), or swings in time as the
-    motion does, so that friction is in it."""
+    motion does, so that friction is in it, or is two waves in place of one that swells."""
     at = fit.structure.of_cause(index)
     departures = [p.default == 0.0 and p.lower == -p.upper for p in fit.structure.causes[index].fitted]
     x, lower, upper = fit.x[at], fit.structure.lower[at], fit.structure.upper[at]
     at_bound = np.any(np.array(departures, dtype=bool) & ((x <= lower + EDGE) | (x >= upper - EDGE)))
-    return bool(at_bound) or _in_step(short, fit, index)
+    return bool(at_bound) or _in_step(short, fit, index) or _merged(short, fit, index)
+
+
+def _merged(short: Data, fit: Fit, index: int) -> bool:
+    values = fit.structure.values(fit.x)[index]
+    return merged(fit.structure.causes[index].form, values, float(np.ptp(short.position_mm)))
 
 
 def _in_step(short: Data, fit: Fit, index: int) -> bool:

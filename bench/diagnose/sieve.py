@@ -22,7 +22,7 @@ from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
 from .path import Trial
 from .refit import Fit, extended, force_at, jacobian, refit
-from .ripple import ripples, two_periods
+from .ripple import merged, ripples, two_periods
 from .spectrum import one_more_mode
 from .way import is_rich
 
@@ -310,10 +310,14 @@ class Sieve:
         return trial
 
     def _of_one_period(self, trials: list[Trial]) -> list[Trial]:
-        """The trials of a family without a second period where that one's numbers end at their bounds: it must not cost
-        the others their place."""
-        kept = [t for t in trials if not two_periods(t.cause.form) or believable(t.fit, self.prepared)]
+        """The trials of a family without a second period where that one's numbers end at their bounds, or is none: it
+        must not cost the others their place."""
+        kept = [t for t in trials if not two_periods(t.cause.form) or self._apart(t.fit)]
         return kept or trials
+
+    def _apart(self, fit: Fit) -> bool:
+        cause, values = fit.structure.causes[-1], fit.structure.values(fit.x)[-1]
+        return believable(fit, self.prepared) and not merged(cause.form, values, self.reach.travel_mm)
 
     def _plainest(self, trials: list[Trial]) -> Trial:
         """The best; or a form of fewer numbers that is as good for what there is to explain, or leaves less than noise

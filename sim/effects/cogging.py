@@ -8,9 +8,9 @@
   differ (S. Chen, C. Namuduri, S. Mir, Controller-induced parasitic torque ripples in a PM synchronous motor, IEEE
   Trans. Ind. Appl. 38, 2002, 1273–1281).
 - `swelling`: the sine grows along the way, as towards the end of the magnets: amplitude · (1 + growth (y − at_depth)).
-- `driven`: the sine grows with the force of the pad, which the motor bears: amplitude · (1 + growth · |F|), the ripple
-  of the thrust beside that of the magnets (N. Bianchi, S. Bolognani, A. D. F. Cappello, Reduction of cogging force in
-  PM linear motors by pole-shifting, IEE Proc. Electr. Power Appl. 152, 2005, 703–709).
+- `driven`: the sine grows with the force of the pad, which the motor bears: amplitude · (1 + growth (|F|/at_load − 1)),
+  the ripple of the thrust beside that of the magnets (N. Bianchi, S. Bolognani, A. D. F. Cappello, Reduction of cogging
+  force in PM linear motors by pole-shifting, IEE Proc. Electr. Power Appl. 152, 2005, 703–709).
 - `uneven`: as `swelling`, of the sine with its second and third harmonic: edges of slots, in a row that ends.
 - `trailing`: the sine of a place that is dragged along, as iron's field is behind the magnets': the middle of a play of
   the full width `trail`.
@@ -82,8 +82,8 @@ def note_load(dt: float, force: float, state: State, p: State) -> float:
 
 @block
 def driven(dt: float, y: float, state: State, p: State) -> float:
-    """Force in N; p = (amplitude, period, phase, growth); state: the pad's force."""
-    return p[0] * (1.0 + p[3] * state[0]) * math.sin(2.0 * math.pi * y / p[1] + p[2])
+    """Force in N; p = (amplitude, period, phase, growth, at_load); state: the pad's force."""
+    return p[0] * (1.0 + p[3] * (state[0] / p[4] - 1.0)) * math.sin(2.0 * math.pi * y / p[1] + p[2])
 
 
 @block
@@ -241,7 +241,10 @@ EFFECT = Effect(
                 _AMPLITUDE,
                 _PERIOD,
                 PHASE,
-                Parameter("growth", "1/N", 0.0, 1000.0, 0.5, "relative growth per N", starts=(0.1, 1.0)),
+                Parameter(
+                    "growth", "1", 0.0, 1.5, 0.5, "share that goes with the load, at `at_load`", starts=(0.3, 0.8)
+                ),
+                Parameter("at_load", "N", 1e-6, 1e5, 1.0, "force of the pad at which the amplitude holds", fixed=True),
             ),
             sought=False,
             blocks={"load": note_load, "probe": driven},

@@ -147,8 +147,8 @@ class TestFriction:
             drag = 0.05 * (1 + 0.4 * load) * np.where(t <= 2.0, 1.0, -1.0)
             cell = Cascade(pad, [*beside, friction]).simulate(t, x + (0.01 * drag if beside else 0.0))
             assert_allclose((cell - load - drag)[[500, 1500, 3000]], 0.0, atol=1e-9 if not beside else 2e-5)
-            cogging = active("cogging", "driven", amplitude=0.05, period=0.3, phase=0.2, growth=0.4)
-            wave = 0.05 * (1 + 0.4 * load) * np.sin(2 * np.pi * y / 0.3 + 0.2)
+            cogging = active("cogging", "driven", amplitude=0.05, period=0.3, phase=0.2, growth=0.4, at_load=2.0)
+            wave = 0.05 * (1 + 0.4 * (load / 2.0 - 1)) * np.sin(2 * np.pi * y / 0.3 + 0.2)
             cell = Cascade(pad, [*beside, cogging]).simulate(t, x + (0.01 * wave if beside else 0.0))
             assert_allclose(cell - load, wave, atol=1e-12)
 

@@ -8,13 +8,16 @@ from typing import cast
 import numpy as np
 import pytest
 
-from bench.diagnose import ripple
+from bench.diagnose import diagnose, ripple
 from bench.diagnose.candidates import Reach, narrowed
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.path import Trial
 from bench.diagnose.refit import Fit
 from bench.diagnose.sieve import plainer_first
 from sim.effects import effect
+from sim.model import Model
+from tests.bench.diagnose.small import measurement
+from tests.truth.cases import draw_case
 
 DEPTH_mm = np.concatenate([np.linspace(0.0, 3.0, 400), np.linspace(3.0, 0.0, 200)])
 REACH = Reach(sample_s=0.005, span_s=60.0, travel_mm=3.0, depth_mm=3.0, force_N=5.0, changes_N=60.0)
@@ -62,6 +65,27 @@ def test_two_ripples_begin_near_their_periods_the_greater_first(id_, seed, great
     assert abs(3.0 / values["period"] - 3.0 / period) < 0.25
     assert abs(3.0 * values["order"] / values["period"] - 3.0 * order / period) < 0.25
     assert values["ratio"] < 0.95
+
+
+@pytest.mark.parametrize(
+    ("order", "period_mm", "one"), [(1.1, 2.0, True), (0.9, 2.0, True), (1.1, 0.2, False), (1.4, 2.0, False)]
+)
+def test_two_waves_of_less_than_a_beat_are_one_that_swells(order: float, period_mm: float, one: bool) -> None:
+    values = {"period": period_mm, "order": order}
+    assert ripple.merged(effect("cogging").form("two_periods"), values, 3.0) is one
+    assert not ripple.merged(effect("cogging").form("swelling"), {"period": period_mm}, 3.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [4, *(pytest.param(s, marks=pytest.mark.long) for s in (0, 1, 2, 3, 5))])
+def test_a_ripple_that_goes_with_the_load_has_a_size_and_is_not_two_waves_that_cancel(seed: int) -> None:
+    """Of ten times its size each, and told to within their own size: the sum is all that the data have."""
+    c = draw_case(seed, ("cogging",), 1.0, "thrust")
+    said = diagnose(measurement(c), Model.from_dict(c.believed))
+    assert said.verdict == "explained" and [cause.id for cause in said.causes] == ["cogging"]
+    size, true_N = said.causes[0].parameters["amplitude"], c.truth.parameters["cogging"]["amplitude"]
+    assert size.std < 0.4 * size.value
+    assert abs(size.value - true_N) < 0.35 * true_N
 
 
 def test_starts_are_apart_and_within_bounds():
