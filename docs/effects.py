@@ -274,7 +274,7 @@ this page find it by its id.
    several places and share their state. A form without blocks may shift times (`time_shift`) or put another pad in
    place (`amend`).
 2. A block is a function of (dt, input, state, parameters) in plain arithmetic; it is compiled. It must take dt = 0.
-   From `frame` to `gap` it keeps all memory in `state` and is continuous in its input, as it is solved for.
+   From `frame` to `load` it keeps all memory in `state` and is continuous in its input, as it is solved for.
 3. Say what a fit needs: `amplitude` for the number that switches the effect off at 0, `starts` for shapes,
    `floor` for values that no data can show, `fixed` for choices. A lower bound above 0 means a fit on the logarithm.
    `of_motion=False` where it runs in time or stands at a level: one press and one hold then suffice for a sure name.

@@ -3,9 +3,9 @@
 A plant is a *program* (int64: sizes, then the blocks by place), its *parameters* and its *state* (float64); see
 sim/program.py for how they are laid out. One step, from motor side to load cell:
 
-    x ─ play ─►(+)─► y ─ depth ─► δ ─ law·elastic ─► F^e ─ relaxation ─► + contact, gap ─► F_pad ─► + probe(y) ─► F_cell
-                ▲ −                                                                                         │
-                └────────────────────────────────── frame ◄─────────────────────────────────────────────────┘
+    x ─ play ─►(+)─► y ─ depth ─► δ ─ law·elastic ─► F^e ─ relaxation ─► + contact, gap ─► F_pad ─► + load(F_pad),
+                ▲ −                                                                              probe(y) ─► F_cell
+                └────────────────────────────────── frame ◄───────────────────────────────────────────────┘
 
 Everything between frame and cell is inside a loop without delay: y + Σ frame(F_cell(y)) = x is solved in every step, to
 rounding, on trial copies of the state, and the copy at the solution becomes the state.
