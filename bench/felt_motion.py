@@ -31,9 +31,7 @@ BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
 TOGETHER = 20  # samples that share the error of a window, about
 ASTRAY = 1.4  # times what noise makes of a window's value: so far off is it, in sines of any speed
 WIDTH = 2.2  # standard deviations on either side of a value
-ODD_STEPS = (
-    0.05  # share of the steps between the values of a coarse channel that may be less: some values are not its own
-)
+ODD_STEPS = 0.05  # share of the steps between a coarse channel's values that may be less: not all values are its own
 
 
 @compiled("void(float64[::1], float64[::1], float64, float64, int64[::1], int64, float64[::1], float64[::1])")

@@ -84,7 +84,7 @@ def families(short: Data, lead: Fit, indices: Sequence[int]) -> list[list[Member
         for index in indices
         for form in lead.structure.causes[index].effect.forms
         if form.name != lead.structure.causes[index].form.name and _comparable(lead.structure.causes[index].form, form)
-        if not form.has_a_course or lead.structure.in_air or is_rich(short)
+        if not form.has_a_course or lead.structure.in_air or is_rich(short, not lead.structure.pad.pad.unilateral)
     ]
     with ThreadPoolExecutor(WORKERS) as pool:
         found = list(pool.map(lambda pair: _other(short, lead, *pair), tried))

@@ -62,7 +62,7 @@ class Sieve:
         self.believed = structure
         self.samples = float(prepared.full.weight.sum())
         full = prepared.full
-        rich = structure.in_air or is_rich(full)
+        rich = structure.in_air or is_rich(full, not structure.pad.pad.unilateral)
         self.reach = Reach.of(full, structure, prepared.sample_s, rich)
 
     @property

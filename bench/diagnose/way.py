@@ -22,16 +22,16 @@ MOVES = 0.2  # of the mean speed over all of the run
 TOLD_ONCE = 0.5  # how sure a name can be of what acts with the motion, where data are not rich
 
 
-def is_rich(data: Data) -> bool:
+def is_rich(data: Data, bonded: bool = False) -> bool:
     """Whether a measurement comes back, and holds several depths, or some again, or passes over it several times. The
-    way above the surface tells nothing of a pad."""
+    way above the surface tells nothing of a pad, but of a `bonded` one."""
     counted = data.weight > 0
-    x = np.maximum(data.position_mm, 0.0)
+    x = data.position_mm if bonded else np.maximum(data.position_mm, 0.0)
     span = float(np.ptp(x[counted])) if counted.any() else 0.0
     if span <= 0.0 or _passes(x, LEAST * span) < 2:
         return False
     held = [float(np.mean(x[s])) for s in holds(data.time_s, x)]
-    held = [level for level in held if level > LEAST * span]
+    held = [level for level in held if abs(level) > LEAST * span]
     held = [level for before, level in pairwise([np.inf, *held]) if abs(level - before) > LEAST * span]
     first = [level for k, level in enumerate(held) if all(abs(level - other) > LEAST * span for other in held[:k])]
     again = len(held) - len(first)

@@ -47,6 +47,12 @@ def test_several_depths_held_or_passes_make_data_rich_that_come_back(levels_mm, 
     assert is_rich(data(levels_mm)) is rich
 
 
+def test_the_way_above_the_surface_is_one_of_a_bonded_pad():
+    pulled = data([0.5, 2.0, 0.0, -1.0, -2.0])
+    assert not is_rich(pulled)
+    assert is_rich(pulled, bonded=True)
+
+
 @pytest.mark.parametrize(("hold_s", "share"), [(0.0, 1.0), (1.0, 0.5), (9.0, 0.1)])
 def test_the_share_of_the_forces_that_are_felt_on_the_way(hold_s, share):
     assert on_the_way(data([1.0, 2.0, 1.0, 0.0], hold_s)) == pytest.approx(share, abs=0.01)
