@@ -17,6 +17,7 @@ from .path import Measure, Path, Trial
 from .refit import Fit, chi2, force_at, reduced, refit
 from .result import Alternative, CauseFound, Number
 from .search import Search
+from .shapes import departed
 from .way import TOLD_ONCE, most_sure
 
 EXPLAINED = 0.25  # of the error: what surely named causes may leave
@@ -30,6 +31,7 @@ NOTHING = 0.1  # of its standard deviation, that a size is
 HARDLY = 0.3  # sure of a name
 SLIGHT, SLIGHTLY = 0.02, 0.65  # of the error: how sure a cause that takes less beside another can be. In a campaign two
 # of three were right, and what the others took was missing from the first one's shape
+ANOTHERS = 0.5  # how sure the name of a cause can be that is as far from its family's first shape as it can go
 BEGUN = 0.02  # of a cause's size, with which it begins anew
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
@@ -239,6 +241,7 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
         values = {name: number.value for name, number in numbers.items()}
         most = min(told_size(final, own + k), most_sure(cause.effect, search.reach.rich))
         most = min(most, SLIGHTLY) if len(gains) > 1 and gain < SLIGHT else most
+        most = min(most, ANOTHERS) if departed(search.short, final, own + k) else most
         confidence, kind = min(confidence, most), min(kind, most)
         out.append(
             CauseFound(

@@ -10,10 +10,11 @@ import pytest
 from bench.diagnose import candidates, diagnose, shapes, spread
 from bench.diagnose.modes import as_believed
 from bench.diagnose.numbers import Coordinate, cause_of
+from bench.diagnose.path import Measure
 from bench.diagnose.refit import Fit, onto, refit
 from bench.diagnose.shapes import departed, reshaped, steadier
 from bench.diagnose.spread import covariance, of_the_noise
-from bench.diagnose.verdict import told_size
+from bench.diagnose.verdict import found, told_size
 from sim.effects import effect
 from sim.model import Model
 from sim.relaxation import Relaxation
@@ -289,6 +290,32 @@ def test_a_size_is_as_sure_as_it_is_where_its_course_is_given() -> None:
         spread = alike[:count, :count]
         final: Any = SimpleNamespace(structure=structure, x=np.zeros(count), covariance=lambda spread=spread: spread)
         assert told_size(final, 0) == pytest.approx(sure)
+
+
+@pytest.mark.parametrize(("growth", "sure"), [(0.5, 1.0), (-0.9, 0.5)])
+def test_a_name_is_half_sure_where_its_shape_is_as_far_as_it_goes_from_the_first(growth: float, sure: float) -> None:
+    """A pad that hardens was a frame that each load makes stiffer, down to nothing; the 15 % left told of that."""
+    frame = effect("frame_compliance")
+    cause = cause_of(frame, frame.form("loosening"), {"compliance": 0.02, "growth": growth})
+    x = np.array([cause.start[p.name] for p in cause.fitted])
+    structure = SimpleNamespace(
+        causes=(cause,),
+        of_cause=lambda index: slice(0, len(x)),
+        values=lambda x: [dict(cause.start)],
+        coordinates=[Coordinate(p.name, p.lower, p.upper) for p in cause.fitted],
+        lower=np.array([p.lower for p in cause.fitted]),
+        upper=np.array([p.upper for p in cause.fitted]),
+    )
+    final: Any = SimpleNamespace(structure=structure, x=x, covariance=lambda: 1e-8 * np.eye(len(x)))
+    search: Any = SimpleNamespace(
+        believed=SimpleNamespace(causes=()),
+        reach=SimpleNamespace(rich=True),
+        short=SimpleNamespace(position_mm=np.array([0.0, 2.0]), time_s=np.array([0.0, 1.0])),
+    )
+    measure = Measure(1e5, 1e3, 1e3, 1.0)
+    stage = (SimpleNamespace(fit=SimpleNamespace(chi2=1e3, structure=structure)), [], measure)
+    path: Any = SimpleNamespace(stage_of=lambda id_: stage)
+    assert found(search, path, final, [1.0])[0].confidence == sure
 
 
 def test_a_drift_that_settles_is_known_without_half_waves_of_its_rate():
