@@ -120,6 +120,17 @@ def test_with_more_work_a_search_finds_what_is_left(monkeypatch: pytest.MonkeyPa
     assert left < _worked(monkeypatch, 1)[2] < np.inf and work < 60_000_000
 
 
+@pytest.mark.long
+def test_a_second_cause_may_take_as_much_work_again_where_the_first_leaves_much(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    work, ids, left = _worked(monkeypatch, 1)
+    assert len(ids) == 1
+    assert len(_worked(monkeypatch, int(0.4 * work))[1]) == 1
+    work, ids, less = _worked(monkeypatch, int(0.6 * work))
+    assert sorted(ids) == ["force_drift", "stress_softening"] and less < left
+
+
 def test_where_a_model_runs_away_its_error_has_no_end_and_no_step_is_taken_there():
     """Forces of e^120 N are numbers still; over a noise this small they are none."""
     time, depth = np.arange(500) * 0.01, np.linspace(0.0, 2.0, 500)
