@@ -191,10 +191,14 @@ def _small(fit: Fit, prepared: Prepared) -> bool:
 
 def _own(fit: Fit, prepared: Prepared) -> bool:
     """Whether the last cause is clear of its bounds: there it is another's limit, as a wave longer than the data is, a
-    pull of any reach, or a mode so damped that it is a lag. (Another law is one at any of its numbers.)"""
+    pull of any reach, a mode so damped that it is a lag, or a drift that is over at once. (Another law is one at any of
+    its numbers.)"""
     cause = fit.structure.causes[-1]
     values = fit.structure.values(fit.x)[-1]
     if cause.id == "saturation" and not _ends(fit, prepared):
+        return False
+    shortest_s = next((p.lower for p in cause.form.parameters if p.name == "time_constant"), 0.0)
+    if cause.id == "force_drift" and values.get("time_constant", np.inf) <= EDGE * shortest_s:
         return False
     return cause.form.amend is not None or within_bounds(cause, values)
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from bench.diagnose.evidence import Evidence, threshold
+from bench.diagnose.evidence import Evidence, believable, threshold
+from bench.diagnose.numbers import cause_of
 from bench.diagnose.verdict import explains, speaks
+from sim.effects import effect
 from tests.bench.diagnose.small import made_up
 
 
@@ -25,6 +29,17 @@ def test_what_takes_next_to_nothing_leaves_the_rest_as_explained_as_it_is() -> N
     first = replace(made_up().causes[0], gain=0.8, confidence=0.99)
     for gain, explained in ((0.01, True), (0.05, False)):  # a fifth is left, and of a quarter 65 % are 16 %
         assert explains(0.19, [first, replace(first, gain=gain, confidence=0.65)]) is explained
+
+
+@pytest.mark.parametrize(("time_constant_s", "own"), [(30.0, True), (1.0, False)])
+def test_a_drift_that_is_over_at_once_is_a_bias(time_constant_s: float, own: bool) -> None:
+    drift = effect("force_drift")
+    cause = cause_of(drift, drift.form("settling"), {"rate": 3.0, "time_constant": time_constant_s})
+    structure = SimpleNamespace(causes=(cause,), values=lambda x: [dict(cause.start)])
+    fit: Any = SimpleNamespace(structure=structure, x=None)
+    noise = SimpleNamespace(force_N=0.01)
+    prepared: Any = SimpleNamespace(sample_s=0.01, position_noise_mm=1e-3, noise=noise)
+    assert believable(fit, prepared) is own
 
 
 @pytest.mark.parametrize(("alone", "explained"), [(-0.5, True), (-19.0, False)])
