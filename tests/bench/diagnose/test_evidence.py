@@ -38,7 +38,7 @@ def test_a_drift_that_is_over_at_once_is_a_bias(time_constant_s: float, own: boo
     structure = SimpleNamespace(causes=(cause,), values=lambda x: [dict(cause.start)])
     fit: Any = SimpleNamespace(structure=structure, x=None)
     noise = SimpleNamespace(force_N=0.01)
-    prepared: Any = SimpleNamespace(sample_s=0.01, position_noise_mm=1e-3, noise=noise)
+    prepared: Any = SimpleNamespace(sample_s=0.01, position_noise_mm=1e-3, doubt_mm=0.0, zero_N=0.0, noise=noise)
     assert believable(fit, prepared) is own
 
 
