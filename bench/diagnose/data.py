@@ -34,6 +34,7 @@ SHORT = 1500  # samples that need no stand-in
 LEAST_SHARED = 1e-2  # of the noise's own square: what is shared and less changes nothing
 TARGET, MOST = 4000, 6000  # samples of the stand-in, where its blocks can be that long
 FASTEST, WIDEST = 0.12, 8.0  # growth of blocks; times what the travel within one may make of force
+RESTS = 81  # samples that make a rest
 FINELY = 2e-3  # of the travel, that a block spans at the most: in air no stiffness says how finely
 
 
@@ -392,6 +393,7 @@ def _grouped(full: Data, reach: float, rate: float, jump_mm: float, between: flo
         bent = np.abs(position[2 * k :] - 2 * position[k:-k] + position[: -2 * k]) > max(0.5 * reach, jump_mm)
         sharper = np.convolve(turns, np.ones(2 * k + 1), mode="same")[k:-k] > 0.5
         turns[k:-k] |= bent & ~sharper
+    turns |= _rests(position, max(0.5 * reach, jump_mm))
     corner = np.flatnonzero(turns)
     index = np.arange(full.size)
     since = index - corner[np.searchsorted(corner, index, side="right") - 1]
@@ -401,6 +403,16 @@ def _grouped(full: Data, reach: float, rate: float, jump_mm: float, between: flo
     nodes = np.where(full.weight > 0, -1.0, full.time_s - full.time_s[0])
     away, between = np.cumsum(np.abs(step)), max(between, reach)
     return _cut(away, since.astype(np.float64), nodes, piece, reach, between, rate, full.sample_s)
+
+
+def _rests(position_mm: Array, still_mm: float) -> NDArray[np.bool_]:
+    """Where a motion comes to rest, however gently (n,): from there on a pad relaxes, as after a corner."""
+    out = np.zeros(position_mm.size, dtype=bool)
+    if position_mm.size > RESTS:
+        half, whole = (np.abs(position_mm[k:] - position_mm[:-k])[: out.size - RESTS] for k in (RESTS // 2, RESTS))
+        rests = (half < still_mm) & (whole < still_mm)
+        out[1 : rests.size] = rests[1:] & ~rests[:-1]
+    return out
 
 
 @compiled("int64[::1](float64[::1], float64[::1], float64[::1], int64[::1], float64, float64, float64, float64)")
