@@ -215,8 +215,9 @@ def numbers(cause: CauseFound, most: int = SHOWN) -> str:
 
 
 def untold(cause: CauseFound) -> str:
-    """Which of a cause's numbers these data hardly tell; empty: none."""
-    wide = [name for name, n in cause.parameters.items() if math.isfinite(n.std) and n.std > UNTOLD * abs(n.value) > 0]
+    """Which of a cause's numbers these data hardly tell; empty: none. An angle near 0 is told as well as any other."""
+    scale = {name: 1.0 if n.unit == "rad" else abs(n.value) for name, n in cause.parameters.items()}
+    wide = [name for name, n in cause.parameters.items() if math.isfinite(n.std) and n.std > UNTOLD * scale[name] > 0]
     return f"hardly told by these data: {', '.join(wide)}" if wide else ""
 
 

@@ -56,6 +56,8 @@ def test_numbers_that_the_data_hardly_tell_are_said_to_be_such():
     )
     assert untold(wide) == "hardly told by these data: reach"
     assert untold(wide) in "\n".join(lines(made_up(causes=[wide])))
+    for std, said in ((0.01, ""), (2.0, "hardly told by these data: phase")):
+        assert untold(replace(first, parameters={"phase": Number(-1e-3, "rad", std)})) == said
 
 
 def test_excluded_rivals_are_said_to_be_excluded_and_only_near_ones():
