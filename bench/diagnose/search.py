@@ -38,7 +38,8 @@ Array = NDArray[np.float64]
 MANY_MORE = 2  # numbers of a shape beyond those of the plain one: then two plain causes are asked for in its place
 SAME = 0.6  # share of a further cause's gain that another shape of a cause found reaches: then it is no further cause
 QUIET = 2.0  # times the noise's square: what is left altogether, where its colour is taken in
-MOST_WORK, MORE_FOR_TWO = 150_000_000, 2.0  # simulated samples, after which no further cause is looked for; times that
+MOST_WORK = 150_000_000  # simulated samples, after which no further cause is looked for
+MORE_FOR_TWO = 2.0  # times those, where the first of two leaves much
 A_SHAPE = 0.1  # of what is left beyond the noise, that another shape of a cause takes where no further cause pays
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
@@ -131,8 +132,9 @@ class Search(Shaping):
             now = self.work
             # a third cause is not begun where it would not be done with what is left: most often there is none
             will_take = now - turned_at if len(path.fits) > 2 else 0
-            # a second one is, once, where the first leaves much: with that alone the answer is none
-            if now - begun + will_take >= MOST_WORK * (MORE_FOR_TWO if self._needs_two(path) else 1.0):
+            # a second one is, where the first leaves much: with that alone the answer is none
+            needs_two = len(path.fits) == 2 and self._much_left(path)
+            if now - begun + will_take >= MOST_WORK * (MORE_FOR_TWO if needs_two else 1.0):
                 break
             turned_at = now
             self._whitened(path)
@@ -152,10 +154,10 @@ class Search(Shaping):
                 break
         return path
 
-    def _needs_two(self, path: Path) -> bool:
-        """Whether there is one cause, which leaves much of what the belief left beyond the noise."""
+    def _much_left(self, path: Path) -> bool:
+        """Whether what was found leaves much of what the belief left beyond the noise."""
         base, end = path.fits[0].chi2, path.fits[-1].chi2
-        return len(path.fits) == 2 and end - self.expected > MUCH_LEFT * (base - self.expected)
+        return end - self.expected >= MUCH_LEFT * (base - self.expected)
 
     def _from_another_first(self, path: Path, begun: int) -> Path | None:
         """The path to two causes from one that stood near the first, where the first leaves much and those two leave
@@ -164,7 +166,7 @@ class Search(Shaping):
             return None
         base, end, prepared = path.fits[0], path.fits[-1], self.prepared
         left = end.chi2 - self.expected
-        if left < MUCH_LEFT * (base.chi2 - self.expected) or unexplained(end.chi2, self.expected) <= 0.0:
+        if not self._much_left(path) or unexplained(end.chi2, self.expected) <= 0.0:
             return None
         for near in self._near(base, path.rivals[0]):
             if self.work - begun >= MOST_WORK:

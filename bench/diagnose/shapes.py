@@ -19,7 +19,7 @@ from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, chi2, reduced, refit
 from .ripple import merged, ripples
-from .way import is_rich
+from .way import met_again
 
 Array = NDArray[np.float64]
 
@@ -79,12 +79,13 @@ def stand_in(short: Data, fit: Fit) -> tuple[Fit, list[int]]:
 
 def families(short: Data, lead: Fit, indices: Sequence[int]) -> list[list[Member]]:
     """Of each of some causes, the shape that leads and those others of its family that make a plant."""
+    again = met_again(short, lead.structure)
     tried = [
         (index, form)
         for index in indices
         for form in lead.structure.causes[index].effect.forms
         if form.name != lead.structure.causes[index].form.name and _comparable(lead.structure.causes[index].form, form)
-        if not form.has_a_course or lead.structure.in_air or is_rich(short, not lead.structure.pad.pad.unilateral)
+        if again or not form.has_a_course
     ]
     with ThreadPoolExecutor(WORKERS) as pool:
         found = list(pool.map(lambda pair: _other(short, lead, *pair), tried))

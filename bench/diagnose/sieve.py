@@ -24,7 +24,7 @@ from .path import Trial
 from .refit import Fit, extended, force_at, jacobian, refit
 from .ripple import merged, ripples, two_periods
 from .spectrum import one_more_mode
-from .way import is_rich
+from .way import met_again
 
 Array = NDArray[np.float64]
 
@@ -62,8 +62,7 @@ class Sieve:
         self.believed = structure
         self.samples = float(prepared.full.weight.sum())
         full = prepared.full
-        rich = structure.in_air or is_rich(full, not structure.pad.pad.unilateral)
-        self.reach = Reach.of(full, structure, prepared.sample_s, rich)
+        self.reach = Reach.of(full, structure, prepared.sample_s, met_again(full, structure))
 
     @property
     def short(self) -> Data:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from sim.effects.base import Effect
 
     from .data import Data
+    from .numbers import Structure
 
 LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data rich which come back
 AGAIN = 2  # times that a depth is held again, after another one, which do as well
@@ -36,6 +37,11 @@ def is_rich(data: Data, bonded: bool = False) -> bool:
     first = [level for k, level in enumerate(held) if all(abs(level - other) > LEAST * span for other in held[:k])]
     again = len(held) - len(first)
     return len(first) >= LEVELS or again >= AGAIN or _passes(x, 0.5 * span) >= PASSES
+
+
+def met_again(data: Data, structure: Structure) -> bool:
+    """Whether a measurement comes back over the depths of a structure's pad, or there is none."""
+    return structure.in_air or is_rich(data, not structure.pad.pad.unilateral)
 
 
 def on_the_way(data: Data) -> float:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from sim.jit import State, block
+from sim.jit import State, block, compiled
 
 _LAST, _FORCE, _STARTED, _LOAD = range(4)
 _GREASE = 3
@@ -15,16 +15,21 @@ _CREEP_MM_S = 0.1
 _FIRST, _ELEMENTS = 3, 5
 
 
+@compiled("float64(float64, float64, float64, float64)")
+def slid(force: float, moved: float, stiffness: float, limit: float) -> float:
+    """Prandtl's element: the force, N, of a spring of `stiffness` N/mm before a slider that bears `limit` N either way,
+    once it has moved by so many mm from where it had `force`."""
+    return max(-limit, min(limit, force + moved * stiffness))
+
+
 @block
 def coulomb(dt: float, y: float, state: State, p: State) -> float:
     """Prandtl's element; p = (coulomb, presliding)."""
     moved = y - state[_LAST] if state[_STARTED] != 0.0 else 0.0
     state[_STARTED] = 1.0
     state[_LAST] = y
-    force = state[_FORCE] + moved * (p[0] / p[1])
-    force = max(-p[0], min(p[0], force))
-    state[_FORCE] = force
-    return force
+    state[_FORCE] = slid(state[_FORCE], moved, p[0] / p[1], p[0])
+    return state[_FORCE]
 
 
 @block
@@ -49,10 +54,8 @@ def maxwell_slip(dt: float, y: float, state: State, p: State) -> float:
     total = 0.0
     for k in range(_ELEMENTS):
         reach = p[1] * p[2] ** (k - 0.5 * (_ELEMENTS - 1))
-        force = state[_FIRST + k] + moved * (limit / reach)
-        force = max(-limit, min(limit, force))
-        state[_FIRST + k] = force
-        total += force
+        state[_FIRST + k] = slid(state[_FIRST + k], moved, limit / reach, limit)
+        total += state[_FIRST + k]
     return total
 
 
@@ -67,11 +70,9 @@ def stribeck(dt: float, y: float, state: State, p: State) -> float:
     state[_LAST] = y
     speed = abs(moved) / dt if dt > 0.0 else 0.0
     limit = p[0] * (1.0 + (p[1] - 1.0) * math.exp(-((speed / p[2]) ** 2)))
-    force = state[_FORCE] + moved * (p[0] / p[4])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
+    state[_FORCE] = slid(state[_FORCE], moved, p[0] / p[4], limit)
     viscous = p[3] * moved / dt if dt > 0.0 else 0.0
-    return force + viscous
+    return state[_FORCE] + viscous
 
 
 @block
@@ -95,10 +96,8 @@ def load_dependent(dt: float, y: float, state: State, p: State) -> float:
     state[_STARTED] = 1.0
     state[_LAST] = y
     limit = p[0] * (1.0 + p[1] * state[_LOAD])
-    force = state[_FORCE] + moved * (limit / p[2])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
+    state[_FORCE] = slid(state[_FORCE], moved, limit / p[2], limit)
+    return state[_FORCE]
 
 
 @block
@@ -115,9 +114,8 @@ def worked_in(dt: float, y: float, state: State, p: State) -> float:
         settled = back / (back + gone)
         state[_GREASE] = settled + (state[_GREASE] - settled) * math.exp(-back - gone)
     limit = p[0] * (1.0 + p[1] * state[_GREASE])
-    force = max(-limit, min(limit, state[_FORCE] + moved * (limit / p[4])))
-    state[_FORCE] = force
-    return force
+    state[_FORCE] = slid(state[_FORCE], moved, limit / p[4], limit)
+    return state[_FORCE]
 
 
 @block
@@ -129,10 +127,8 @@ def uneven(dt: float, y: float, state: State, p: State) -> float:
     angle = 2.0 * math.pi * y / p[5]
     more = p[1] * math.sin(angle) + p[2] * math.cos(angle) + p[3] * math.sin(2.0 * angle) + p[4] * math.cos(2.0 * angle)
     limit = p[0] * max(1.0 + more, 0.0)
-    force = state[_FORCE] + moved * (p[0] / p[6])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
+    state[_FORCE] = slid(state[_FORCE], moved, p[0] / p[6], limit)
+    return state[_FORCE]
 
 
 @block
@@ -143,10 +139,8 @@ def tight(dt: float, y: float, state: State, p: State) -> float:
     state[_LAST] = y
     away = (y - p[2]) / p[3]
     limit = p[0] * (1.0 + p[1] * math.exp(-away * away))
-    force = state[_FORCE] + moved * (p[0] / p[4])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
+    state[_FORCE] = slid(state[_FORCE], moved, p[0] / p[4], limit)
+    return state[_FORCE]
 
 
 @block
@@ -156,10 +150,8 @@ def swelling(dt: float, y: float, state: State, p: State) -> float:
     state[_STARTED] = 1.0
     state[_LAST] = y
     limit = p[0] * (1.0 + p[1] * math.sin(2.0 * math.pi * y / p[2] + p[3]))
-    force = state[_FORCE] + moved * (p[0] / p[4])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
+    state[_FORCE] = slid(state[_FORCE], moved, p[0] / p[4], limit)
+    return state[_FORCE]
 
 
 @block
@@ -170,10 +162,8 @@ def logarithmic(dt: float, y: float, state: State, p: State) -> float:
     state[_LAST] = y
     speed = abs(moved) / dt if dt > 0.0 else 0.0
     limit = p[0] * max(1.0 + p[1] * math.log((_CREEP_MM_S + speed) / (_CREEP_MM_S + 1.0)), 0.0)
-    force = state[_FORCE] + moved * (p[0] / p[2])
-    force = max(-limit, min(limit, force))
-    state[_FORCE] = force
-    return force
+    state[_FORCE] = slid(state[_FORCE], moved, p[0] / p[2], limit)
+    return state[_FORCE]
 
 
 @block
