@@ -10,6 +10,7 @@ from typing import Any
 
 from .family import HELD_OUT
 from .judge import listed, named
+from .runs_told import FLAGS_GOOD
 
 Line = dict[str, Any]
 
@@ -19,7 +20,6 @@ NEAR = 0.10
 TOLD = 0.002
 """Of the noise power: what is smaller may be called consistent (docs/formats.md)."""
 
-FLAGS_GOOD = 0.9
 
 IMITATED = 0.25
 """Of the misfit's power: one or two causes of the catalogue that leave no more imitate what was hidden; as much may be

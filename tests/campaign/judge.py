@@ -27,6 +27,7 @@ from tests.truth.rivals import as_good, as_good_in_place
 
 from .family import HELD_OUT, family_rmse_N
 from .plan import CATALOGUE, Item
+from .runs_told import told_by_runs
 
 ROOT = Path(__file__).resolve().parents[2]
 FLAGS = {"saturated": "saturation", "stuck": "stuck_samples", "outlier": "outliers"}
@@ -147,18 +148,23 @@ def _rows(case: Case, force_time_s: np.ndarray) -> np.ndarray:
 
 
 def score_flags(case: Case, force_time_s: np.ndarray, flags: dict[str, list[int]]) -> dict[str, list[int]]:
-    """By fault (hit, flagged, true) samples, among those that the reading of the file kept; `any` for all at once."""
+    """By fault (hit, flagged, true) samples, among those that the reading of the file kept; `any` for all at once, and
+    `told` for all but those of a channel that sticks which no run of equal values tells."""
     index = _rows(case, force_time_s)
     n, out = len(index), {}
-    all_said, all_true = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    all_said, all_true, untold = (np.zeros(n, dtype=bool) for _ in range(3))
     for mine, theirs in FLAGS.items():
         true = case.truth.flags.get(mine, np.zeros(len(case.force_N), dtype=bool))[index]
         said = np.zeros(n, dtype=bool)
         said[np.asarray(flags.get(theirs, []), dtype=int)] = True
         all_said, all_true = all_said | said, all_true | true
+        if mine == "stuck":
+            untold = true & ~told_by_runs(case.force_N[index], true)
         if said.any() or true.any():
             out[theirs] = [int((said & true).sum()), int(said.sum()), int(true.sum())]
-    out["any"] = [int((all_said & all_true).sum()), int(all_said.sum()), int(all_true.sum())]
+    for name, there in (("any", np.ones(n, dtype=bool)), ("told", ~untold)):
+        said, true = all_said & there, all_true & there
+        out[name] = [int((said & true).sum()), int(said.sum()), int(true.sum())]
     return out
 
 

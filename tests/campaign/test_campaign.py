@@ -30,6 +30,7 @@ from .family import family_rmse_N
 from .halves import half as half_of
 from .judge import bounds, clean_rmse_N, score_flags, truth_of
 from .plan import CATALOGUE, Item, plan
+from .runs_told import told_by_runs
 from .table import page
 
 
@@ -105,6 +106,31 @@ def test_flags_are_counted_among_the_samples_that_were_read():
     stamps = np.round(case.force_time_s[kept], 7)
     n = int(there.sum())
     assert score_flags(case, stamps, {"outliers": sorted(said)})["outliers"] == [n - 1, n + 2, n]
+
+
+def test_of_a_channel_that_sticks_runs_longer_than_chance_makes_tell():
+    force = np.array([0, 0, 1, 2, 2, 2, 2, 3, 4, 4, 5, 5, 5, 6], dtype=float)
+    stuck = np.zeros(14, dtype=bool)
+    stuck[[4, 5, 6, 9]] = True
+    # runs of 4: all three repeats are stuck; with that of 3, by chance, 3 of 5, and with those of 2, 4 of 7
+    assert np.flatnonzero(told_by_runs(force, stuck)).tolist() == [4, 5, 6]
+    stuck[[11, 12]] = True  # now with runs of 3, 5 of 5; with those of 2, 6 of 7
+    assert np.flatnonzero(told_by_runs(force, stuck)).tolist() == [4, 5, 6, 11, 12]
+    stuck[1] = True  # all
+    assert np.array_equal(told_by_runs(force, stuck), stuck)
+    stuck[:] = False
+    stuck[4] = True
+    assert not told_by_runs(force, stuck).any()
+    assert not told_by_runs(np.arange(14.0), stuck).any()
+
+
+def test_of_a_coarse_channel_what_no_run_tells_is_not_asked_for():
+    case = draw_case(201, ("stuck_samples",), 0.5, "single_repeats", noise_kind="quantised", noise_N=0.02)
+    stamps = case.time_s if case.force_time_s is None else case.force_time_s
+    counts = score_flags(case, stamps, {})
+    there = int(case.truth.flags["stuck"].sum())
+    assert counts["any"] == [0, 0, there] and there > 10
+    assert counts["told"] == [0, 0, 0]
 
 
 def test_a_model_is_held_against_the_force_without_noise(tmp_path):
