@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import lfilter
 from scipy.stats import chi2 as chi2_law
 
@@ -163,6 +163,11 @@ class _Level:
     window: NDArray[np.intp]
     bent: list[Array]
 
+    @property
+    def white(self) -> Array:
+        """E of each square (k,) for unit white noise, of which the projections took their part."""
+        return np.asarray(6.0 / self.m - np.concatenate([np.sum(bent**2, axis=1) for bent in self.bent]))
+
 
 def _levels(parts: list[tuple[Array, Array]], sample_s: float) -> list[_Level]:
     longest, out = max(len(e) for e, _ in parts), []
@@ -184,72 +189,34 @@ def _levels(parts: list[tuple[Array, Array]], sample_s: float) -> list[_Level]:
     return out
 
 
-@dataclass(frozen=True)
-class _Fading:
-    """Unit noise of ρ_k = Re φ^k."""
+def _of_lags(parts: list[tuple[Array, Array]], level: _Level, kept: Mask) -> Array:
+    """w (n,): Σ w_k ρ_k is what the `kept` squares (k,) are in the mean, for unit noise of correlations ρ.
 
-    phi: complex
-
-    def square(self, m: int) -> float:
-        """E of a square."""
-        phi = self.phi
-        if phi == 0.0:
-            return 6.0 / m
-        k = np.arange(1, m)
-        own = m + 2.0 * np.sum((m - k) * phi**k)
-        reach = (1.0 - phi**m) / (1.0 - phi)
-        return float(np.real(6.0 * own - 8.0 * phi * reach**2 + 2.0 * phi ** (m + 1) * reach**2)) / m**2
-
-    def times(self, Q: Array) -> Array:
-        """R Q, by two recursions."""
-        if self.phi == 0.0:
-            return Q
-        forward = lfilter([1.0], [1.0, -self.phi], Q, axis=0)
-        backward = lfilter([1.0], [1.0, -self.phi], Q[::-1], axis=0)[::-1]
-        return np.asarray(np.real(forward + backward)) - Q
+    With C the stretches, one a row, and B = C Q: the trace of C (1 − QQᵀ) R (1 − QQᵀ) Cᵀ, whatever R is.
+    """
+    stretch = np.repeat([1.0, -2.0, 1.0], level.m) / level.m
+    own = np.correlate(stretch, stretch, "full")[len(stretch) - 1 :]
+    out, at = np.zeros(max(len(e) for e, _ in parts)), 0
+    out[: len(own)] = kept.sum() * np.concatenate([own[:1], 2.0 * own[1:]])
+    for (e, Q), bent in zip(parts, level.bent, strict=True):
+        n = len(e)
+        if len(bent):
+            bent = bent * kept[at : at + len(bent), None]
+            at += len(bent)
+            back = _bent(np.pad(bent, ((3 * level.m - 1,) * 2, (0, 0))), level.m)  # Cᵀ B
+            long = next_fast_len(2 * n, real=True)
+            across = rfft(Q, long, axis=0).conj() * rfft(Q @ (bent.T @ bent) - 2.0 * back, long, axis=0)
+            both = irfft(across.sum(axis=1), long)
+            out[:n] += both[:n]
+            out[1:n] += both[: long - n : -1]
+    return out / int(kept.sum())
 
 
-@dataclass(frozen=True)
-class _Averaged:
-    """Unit noise of ρ_k = 1 − k/width, as white noise has after a running mean: it forgets all at once."""
-
-    width: int
-
-    def square(self, m: int) -> float:
-        """E of a square."""
-        weights = np.repeat([1.0, -2.0, 1.0], m) / m
-        k = np.arange(1, min(self.width, len(weights)))
-        alike = [float(weights[j:] @ weights[:-j]) for j in k.tolist()]
-        return float(weights @ weights + 2.0 * np.sum((1.0 - k / self.width) * alike))
-
-    def times(self, Q: Array) -> Array:
-        """R Q, by two running sums."""
-        n, w = len(Q), self.width
-        padded = np.concatenate([np.zeros((w, Q.shape[1])), Q, np.zeros((w, Q.shape[1]))])
-        once = np.cumsum(padded, axis=0)
-        once = once[w:] - once[:-w]
-        twice = np.cumsum(np.concatenate([np.zeros((1, Q.shape[1])), once]), axis=0)
-        return np.asarray((twice[w:] - twice[:-w])[:n] / w)
-
-
-def _expected(parts: list[tuple[Array, Array]], levels: list[_Level], noise: _Fading | _Averaged) -> list[Array]:
-    """By level, E of each square (k,) for unit noise, of which the projections took their part."""
-    out: list[list[Array]] = [[] for _ in levels]
-    for number, (_, Q) in enumerate(parts):
-        RQ = noise.times(Q)
-        inner = Q.T @ RQ
-        for level, own in zip(levels, out, strict=True):
-            bent = level.bent[number]
-            if len(bent):
-                own.append(np.einsum("ij,ij->i", bent, bent @ inner - 2.0 * _bent(RQ, level.m)))
-    return [np.concatenate(own) + noise.square(level.m) for level, own in zip(levels, out, strict=True)]
-
-
-def _steady(level: _Level, white: Array, windows: int) -> Mask:
+def _steady(level: _Level, windows: int) -> Mask:
     """Windows (windows,) that are no louder than noise is that does not change, by one level of detail."""
     n = np.bincount(level.window, minlength=windows)
     there = n > 0
-    powers = np.bincount(level.window, level.square, windows), np.bincount(level.window, white, windows)
+    powers = np.bincount(level.window, level.square, windows), np.bincount(level.window, level.white, windows)
     loud = powers[0][there] / powers[1][there]
     freedom = np.maximum(n[there] / _together(level.m), 1.0)
     usual = float(np.median(loud / (chi2_law.median(freedom) / freedom)))
@@ -267,24 +234,20 @@ def _together(m: int) -> float:
 def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     """σ, a and φ under which the squares found are likeliest."""
     levels = _levels(parts, sample_s)
-    white = _expected(parts, levels, _Fading(0.0))
     windows = 1 + max(int(level.window.max()) for level in levels)
-    keep = np.logical_and.reduce([_steady(level, w, windows) for level, w in zip(levels, white, strict=True)])
-    at = [keep[level.window] for level in levels]
-    counts = np.array([a.sum() / _together(level.m) for a, level in zip(at, levels, strict=True)])
+    keep = np.logical_and.reduce([_steady(level, windows) for level in levels])
+    used = [(level, at) for level in levels if (at := keep[level.window]).sum() >= 3.0 * _together(level.m)]
+    counts = np.array([at.sum() / _together(level.m) for level, at in used])
+    lags = np.array([_of_lags(parts, level, at) for level, at in used]).reshape(len(used), -1)
+    after_s = sample_s * np.arange(lags.shape[1])
 
-    def mean(values: list[Array]) -> Array:
-        return np.array([v[a].mean() for v, a, n in zip(values, at, counts, strict=True) if n >= 3.0])
-
-    @cache  # the longer memories of 1/f have shorter ones among theirs
     def tail(memory_s: float, frequency_Hz: float = 0.0) -> Array:
-        turn = np.exp(-sample_s / memory_s + 2j * np.pi * frequency_Hz * sample_s)
-        return mean(_expected(parts, levels, _Fading(complex(turn) if frequency_Hz else float(turn.real))))
+        return np.asarray(lags @ (np.exp(-after_s / memory_s) * np.cos(2.0 * np.pi * frequency_Hz * after_s)))
 
-    plain, found = mean(white), mean([level.square for level in levels])
+    plain, found = lags[:, 0], np.array([level.square[at].mean() for level, at in used])
     if len(found) < 3 or not found.all():  # a channel without noise stands still in air
         return ForceNoise(float(np.sqrt(max(found[0] / plain[0], 1e-300))), Colour(), True)
-    weight = 1.0 / (1.0 / counts[counts >= 3.0] + STEADY**2)
+    weight = 1.0 / (1.0 / counts + STEADY**2)
     memories = np.geomspace(0.5 * sample_s, max(MEMORY_S, sample_s), 20).tolist()
     kinds = [_Kind((), [plain]), *(_Kind(_pole(memory, sample_s), [plain, tail(memory)]) for memory in memories)]
     best = _best(kinds, [], found, weight)
@@ -301,7 +264,8 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
         averages = [
             _Kind(
                 _pole(sample_s / float(np.log((w + 1) / (w - 1))), sample_s),
-                [plain, mean(_expected(parts, levels, _Averaged(w)))],
+                # as white noise has after a running mean: it forgets all at once
+                [plain, lags @ np.maximum(1.0 - after_s / (w * sample_s), 0.0)],
             )
             for w in widths
         ]

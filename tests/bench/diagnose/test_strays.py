@@ -150,7 +150,7 @@ def test_a_force_that_goes_on_a_sample_late_has_not_halted():
     assert found.size and set(found) <= set(range(60, 65))
 
 
-@pytest.mark.parametrize(("count", "flagged"), [(1, 0), (5, 5)])
+@pytest.mark.parametrize(("count", "flagged"), [(1, 0), pytest.param(5, 5, marks=pytest.mark.long)])
 def test_one_stray_is_left_out_and_no_fault_of_the_channel(count, flagged):
     for seed in SEEDS:
         c = draw_case(seed, (), protocol="staircase", rate_hz=150.0, jitter="none", noise_kind="white")

@@ -43,7 +43,7 @@ def test_how_much_of_the_force_is_noise(ratio: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "kind", ["white", "coloured", *(pytest.param(k, marks=pytest.mark.long) for k in ("quantised", "heavy"))]
+    "kind", ["coloured", *(pytest.param(k, marks=pytest.mark.long) for k in ("white", "quantised", "heavy"))]
 )
 def test_noise_of_other_kinds_does_not_grow(kind: str) -> None:
     for seed in SEEDS:
@@ -61,10 +61,10 @@ def test_what_is_loud_for_a_while_does_not_grow_with_the_force() -> None:
 
 def test_it_weighs_as_little_as_it_tells_and_is_no_cause() -> None:
     consistent = 0
-    for seed in range(6):
+    for seed in range(3):
         case = quiet(seed, protocol="staircase")
         m = louder(case, seed, 0.005, 0.02 / float(np.max(case.truth.clean_N)))
         sigma = prepare(m, np.ones(len(m.force_N), dtype=bool)).full.sigma_N
         assert sigma.max() / sigma.min() == pytest.approx(np.sqrt(17.0), rel=0.15)
         consistent += diagnose(m, Model.from_dict(case.believed)).verdict == "consistent"
-    assert consistent == 6
+    assert consistent == 3
