@@ -176,6 +176,10 @@ class Felt:
             inside |= (time_s >= begin_s) & (time_s <= end_s)
         return inside
 
+    def corners_at(self, time_s: Array) -> NDArray[np.bool_]:
+        """Which of some times (m,), nodes among them, are where a planned move changes its acceleration."""
+        return np.isin(time_s, [corner_s for *_, move in self.planned for corner_s in move.corners_s().tolist()])
+
     def rest_at(self, time_s: Array) -> NDArray[np.intp]:
         """Number of the rest at some times (m,)."""
         return self.rest[np.clip(np.searchsorted(self.time_s, time_s, side="right") - 1, 0, len(self.rest) - 1)]

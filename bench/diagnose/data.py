@@ -320,9 +320,8 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))), shared, stretch,
         _tared(m, grid), Colour(), sample_s,
     )  # fmt: skip
-    owner = _blocks(
-        full, float(np.quantile(stiffness, 0.98)), sigma_force, 5.0 * float(np.quantile(motion.std_mm, 0.9))
-    )
+    moved = 5.0 * float(np.quantile(motion.std_mm, 0.9))
+    owner = _blocks(full, float(np.quantile(stiffness, 0.98)), sigma_force, moved, motion.corners_at(grid))
     return Prepared(
         name=m.name,
         full=full,
@@ -364,8 +363,11 @@ def _folds(position: Array, weight: Array, travel_mm: float) -> NDArray[np.intp]
     return np.minimum((along * BLOCKS).astype(np.intp), BLOCKS - 1) % FOLDS
 
 
-def _blocks(full: Data, stiffness: float, sigma_force: float, jump_mm: float) -> NDArray[np.intp]:
-    """Blocks that cannot hide a step of force, and grow with the time since the speed last changed."""
+def _blocks(
+    full: Data, stiffness: float, sigma_force: float, jump_mm: float, corners: NDArray[np.bool_]
+) -> NDArray[np.intp]:
+    """Blocks that cannot hide a step of force, and grow with the time since the speed last changed. `corners` (n,):
+    where a planned move changes its acceleration, which a mass or what rings feels at that very time."""
     n = full.size
     if n <= SHORT:
         return np.arange(n)
@@ -374,14 +376,16 @@ def _blocks(full: Data, stiffness: float, sigma_force: float, jump_mm: float) ->
     between = float(np.sqrt(finest * travel))
     rate, wider = 0.05, 1.0
     while True:
-        owner = _grouped(full, wider * finest * (rate / 0.05), rate, jump_mm, between)
+        owner = _grouped(full, wider * finest * (rate / 0.05), rate, jump_mm, between, corners)
         if owner[-1] < TARGET or (rate > FASTEST and (owner[-1] < MOST or wider >= WIDEST)):
             return owner
         # within a move the force goes nearly straight with the position: wide blocks hide less there than after corners
         rate, wider = (rate, 2.0 * wider) if rate > FASTEST else (1.4 * rate, wider)
 
 
-def _grouped(full: Data, reach: float, rate: float, jump_mm: float, between: float) -> NDArray[np.intp]:
+def _grouped(
+    full: Data, reach: float, rate: float, jump_mm: float, between: float, corners: NDArray[np.bool_]
+) -> NDArray[np.intp]:
     """`reach`: travel within a block, mm, and `between` where it has no force and is within a sample's time: there no
     more is asked than that a law's bend be met; `rate`: growth of blocks; `jump_mm`: what noise alone makes of a change
     of speed."""
@@ -399,7 +403,9 @@ def _grouped(full: Data, reach: float, rate: float, jump_mm: float, between: flo
     since = index - corner[np.searchsorted(corner, index, side="right") - 1]
     # history is kept apart from what counts; positions between two forces are not
     counting = index >= int(np.argmax(full.weight > 0))
-    piece = np.cumsum((np.diff(full.fold, prepend=-1) != 0) | np.diff(counting, prepend=False)).astype(np.int64)
+    apart = (np.diff(full.fold, prepend=-1) != 0) | np.diff(counting, prepend=False)
+    apart |= corners | np.append(False, corners[:-1])  # each is a block of its own
+    piece = np.cumsum(apart).astype(np.int64)
     nodes = np.where(full.weight > 0, -1.0, full.time_s - full.time_s[0])
     away, between = np.cumsum(np.abs(step)), max(between, reach)
     return _cut(away, since.astype(np.float64), nodes, piece, reach, between, rate, full.sample_s)

@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from bench.diagnose.data import prepare
-from bench.diagnose.numbers import PadNumbers, Structure
+from bench.diagnose.data import Prepared, prepare
+from bench.diagnose.diagnose import believed_structure
+from bench.diagnose.numbers import PadNumbers, Structure, cause_of
 from bench.diagnose.refit import force_at
 from bench.recording.types import Measurement
+from sim.effects import effect
 from sim.elastic import Exponential
+from sim.model import Model
 from sim.pad import Cascade, Pad
 from sim.relaxation import Relaxation
+from tests.bench.diagnose.small import measurement
+from tests.truth.cases import draw_case
+
+Array = NDArray[np.float64]
 
 PAD = Pad(Exponential(4.0, 0.4), Relaxation((0.2, 0.15), (11.0, 1.6)), unilateral=True)
+
+
+def _means(p: Prepared, force_N: Array) -> Array:
+    """What forces at the samples are over the stand-in's blocks."""
+    return np.bincount(p.owner, force_N * p.full.weight) / np.maximum(np.bincount(p.owner, p.full.weight), 1e-9)
 
 
 @pytest.mark.parametrize("cycles_Hz", [0.7, 1.5])
@@ -34,7 +47,23 @@ def test_it_hides_no_rest_that_a_motion_without_corners_comes_to(cycles_Hz: floa
     p = prepare(Measurement("crank", t, read, t, force), np.ones(t.size, dtype=bool))
     structure = Structure(PadNumbers(PAD, float(x.max()), float(force.max())))
     full, short = (force_at(data, structure, structure.pad.x()) for data in (p.full, p.short))
-    means = np.bincount(p.owner, weights=full * p.full.weight) / np.maximum(np.bincount(p.owner, p.full.weight), 1e-9)
-    off = np.where(p.short.weight > 0, (short - means) / p.short.total_N, 0.0) * np.sqrt(p.short.weight)
+    off = np.where(p.short.weight > 0, (short - _means(p, full)) / p.short.total_N, 0.0) * np.sqrt(p.short.weight)
     assert p.short.size < 0.6 * p.full.size
     assert np.sum(off**2) < 0.1 * np.count_nonzero(p.short.weight > 0)
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3))])
+def test_a_mass_that_rings_feels_a_planned_move_begin_when_it_does(seed: int) -> None:
+    """Where the acceleration jumps between two samples, in a block of a rest it would do so a whole block earlier."""
+    c = draw_case(seed, (), protocol="random_steps", rate_hz=400.0, jitter="none", own_clock=False, noise_N=0.005)
+    m = measurement(c)
+    p = prepare(m, np.ones(len(m.force_N), dtype=bool))
+    pad = believed_structure(Model.from_dict(c.believed), p)
+    rings = {"mass": 0.1, "share": 0.5, "frequency": 100.0, "damping_ratio": 0.08, "window": 2e-5, "lead": 0.0}
+    x = pad.pad.x()
+    mass = pad.with_cause(cause_of(effect("inertia"), effect("inertia").form("hung"), rings))
+    felt = [force_at(d, mass, mass.x(x)) - force_at(d, pad, x) for d in (p.full, p.short)]
+    means = _means(p, felt[0])
+    counts = p.short.weight > 0
+    assert p.short.size < 0.6 * p.full.size
+    assert np.sum((felt[1] - means)[counts] ** 2) < 0.02 * np.sum(means[counts] ** 2)
