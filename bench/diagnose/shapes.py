@@ -175,12 +175,13 @@ def _longer(short: Data, fit: Fit, index: int) -> Fit:
 
     bare = refit(short, *reduced(fit, index), END, 1e-8)
     signatures, end = Signatures(short, bare), len(structure.pad.coordinates)
-    found = [fit, carried(cause.form, values[index], fit.x[:end], END)]
+    found = [carried(cause.form, values[index], fit.x[:end], END)]
     for form in [f for f in cause.effect.forms if f.sought]:
         begun = starts(signatures, cause.effect, with_periods(form, 1.02 * period_mm, longest_mm), LONGER)
         tried = sorted((carried(form, s.cause.start, bare.x[:end], STEPS) for s in begun), key=lambda f: f.chi2)
         found += [refit(short, f.structure, f.x, END, 1e-8) for f in tried[: LONGER // 2]]
-    return found[int(np.argmin(scores(short, [Member(f, index) for f in found])))]
+    members = [Member(fit, index), *(Member(f, index) for f in found if not departed(short, f, index))]
+    return members[int(np.argmin(scores(short, members)))].fit
 
 
 def _in_place(fit: Fit, index: int, cause: Cause, pad: Array) -> tuple[Structure, Array]:
