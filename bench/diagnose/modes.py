@@ -22,7 +22,7 @@ SEEN = 5e-3  # of the force: differences of relaxation that count
 DEALT = 0.3  # e-folds that believed shares and rates may be off, where nothing else tells
 TIMES = 60
 RATES = 6  # from which a spectrum is begun
-STEPS = 10  # of the fit from there
+STEPS = 40  # of the fit from there, at the most: valleys are compared at their ends
 APART = 0.1  # e-folds of a number, by which two ways to deal it out are two
 
 
