@@ -5,7 +5,9 @@ The believed law is replaced as a whole: the forms are those of sim/elastic with
 - `exponential`, `power`: equations (7) to (10) of the paper.
 - `polynomial_2` … `polynomial_5`: equation (14); alpha_0, a jump at first touch, is 0 unless given.
 - `spline`: a monotone cubic through (0, 0) and seven points evenly spaced up to `reach`, each `rise_i` above the last.
-  `reach` is a choice and not fitted: the greatest depth of the data.
+  `reach` is a choice and not fitted: the greatest depth of the data. `fine_spline` has fifteen points, and
+  `graded_spline` too, at depths that go with the square: the closer the nearer to the surface, where a pad that is
+  touched at a point, as a sphere touches, is softest.
 
 Files may say `law:` for `form:`, and for polynomials `law: polynomial, alpha: [α_0, α_1, …]`.
 
@@ -15,9 +17,9 @@ F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5, 1984, 300–304.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING
 
 from sim.effects.base import Effect, Form, Parameter
@@ -50,19 +52,21 @@ def _polynomial(degree: int) -> Callable[[Pad, Mapping[str, float]], Pad]:
     return amend
 
 
-def _spline(knots: int) -> Callable[[Pad, Mapping[str, float]], Pad]:
+def _spline(parts: Sequence[float]) -> Callable[[Pad, Mapping[str, float]], Pad]:
     def amend(pad: Pad, values: Mapping[str, float]) -> Pad:
         from sim.elastic import Spline
 
-        depths = tuple(values["reach"] * i / knots for i in range(1, knots + 1))
-        forces = tuple(accumulate(values[f"rise_{i}"] for i in range(1, knots + 1)))
+        depths = tuple(values["reach"] * part for part in parts)
+        forces = tuple(accumulate(values[f"rise_{i}"] for i in range(1, len(parts) + 1)))
         return replace(pad, law=Spline(depths, forces))
 
     return amend
 
 
-def _spline_form(name: str, what: str, knots: int, sought: bool) -> Form:
-    """A monotone curve through evenly spaced points; `sought`: also where nothing yet speaks for another law."""
+def _spline_form(name: str, what: str, knots: int, sought: bool, grading: int = 1) -> Form:
+    """A monotone curve through points at parts (i/knots)^grading of the reach; `sought`: also where nothing yet speaks
+    for another law."""
+    parts = [(i / knots) ** grading for i in range(1, knots + 1)]
     reach = Parameter("reach", "mm", 1e-3, 100.0, 3.0, "depth of the last point", required=True, fixed=True)
     rises = [
         Parameter(
@@ -70,13 +74,13 @@ def _spline_form(name: str, what: str, knots: int, sought: bool) -> Form:
             "N",
             0.0,
             1e5,
-            0.8 * 1.3 ** (i * KNOTS / knots) * KNOTS / knots,
-            f"force at {i} of {knots} parts of the reach less that at {i - 1}",
+            0.8 * 1.3 ** (KNOTS * part) * KNOTS * (part - before),
+            f"force at {i} of {knots} points down to the reach less that at {i - 1}",
             required=True,
         )
-        for i in range(1, knots + 1)
+        for i, (before, part) in enumerate(pairwise([0.0, *parts]), start=1)
     ]
-    return Form(name, what, (reach, *rises), amend=_spline(knots), sought=sought)
+    return Form(name, what, (reach, *rises), amend=_spline(parts), sought=sought)
 
 
 def _polynomial_form(degree: int) -> Form:
@@ -127,5 +131,6 @@ EFFECT = Effect(
         *(_polynomial_form(degree) for degree in (2, 3, 4, 5)),
         _spline_form("spline", "monotone curve through seven points", KNOTS, True),
         _spline_form("fine_spline", "monotone curve through fifteen points", FINE_KNOTS, False),
+        _spline_form("graded_spline", "the same, with more of the points near the surface", FINE_KNOTS, False, 2),
     ),
 )
