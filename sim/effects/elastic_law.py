@@ -5,9 +5,9 @@ The believed law is replaced as a whole: the forms are those of sim/elastic with
 - `exponential`, `power`: equations (7) to (10) of the paper.
 - `polynomial_2` … `polynomial_5`: equation (14); alpha_0, a jump at first touch, is 0 unless given.
 - `spline`: a monotone cubic through (0, 0) and seven points evenly spaced up to `reach`, each `rise_i` above the last.
-  `reach` is a choice and not fitted: the greatest depth of the data. `fine_spline` has fifteen points, and
-  `graded_spline` too, at depths that go with the square: the closer the nearer to the surface, where a pad that is
-  touched at a point, as a sphere touches, is softest.
+  `reach` is a choice and not fitted: the greatest depth of the data. `graded_spline` has nine points at depths that go
+  with the square, closer near the surface: a pad that is touched at a point, as by a sphere, bends most there.
+  `fine_spline` and `fine_graded_spline` have fifteen.
 
 Files may say `law:` for `form:`, and for polynomials `law: polynomial, alpha: [α_0, α_1, …]`.
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from sim.pad import Pad
 
 KNOTS = 7
+GRADED_KNOTS = 9
 FINE_KNOTS = 15
 
 
@@ -130,7 +131,10 @@ EFFECT = Effect(
         ),
         *(_polynomial_form(degree) for degree in (2, 3, 4, 5)),
         _spline_form("spline", "monotone curve through seven points", KNOTS, True),
+        _spline_form(
+            "graded_spline", "monotone curve through nine points, closer near the surface", GRADED_KNOTS, True, 2
+        ),
         _spline_form("fine_spline", "monotone curve through fifteen points", FINE_KNOTS, False),
-        _spline_form("graded_spline", "the same, with more of the points near the surface", FINE_KNOTS, False, 2),
+        _spline_form("fine_graded_spline", "the same, with points closer near the surface", FINE_KNOTS, False, 2),
     ),
 )

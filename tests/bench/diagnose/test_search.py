@@ -99,6 +99,18 @@ def test_another_law_is_told_by_the_form_of_few_numbers(seed):
     assert trial.fit.chi2 < 1.05 * search.expected
 
 
+@pytest.mark.parametrize("seed", [3, *(pytest.param(s, marks=pytest.mark.long) for s in (1, 2, 4, 5, 6))])
+def test_a_law_that_is_soft_where_it_is_touched_is_no_other_cause(seed):
+    """Seven hundredths of another law beside a power: a curve through even points leaves a step near the surface, which
+    a joint that stiffens or a ripple took in two of six."""
+    told = {"law": "power", "protocol": "rate_sweep", "rate_hz": 150.0, "noise_N": 0.003}
+    c = draw_case(seed, ("elastic_law",), 0.07, "catalogue", **QUIET | told)
+    search, base = begun(c)
+    trial = search.ranked(base)[0]
+    assert trial.id == "elastic_law"
+    assert trial.fit.chi2 < 1.1 * search.expected
+
+
 def _worked(monkeypatch: pytest.MonkeyPatch, most: int) -> tuple[int, list[str], float]:
     """Samples simulated by a search that may simulate so many, what it finds, and what that leaves."""
     c = pair_case(1, ("stress_softening", "force_drift"), protocol="staircase", rate_hz=60.0, **QUIET)
