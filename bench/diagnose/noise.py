@@ -236,6 +236,7 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     levels = _levels(parts, sample_s)
     windows = 1 + max(int(level.window.max()) for level in levels)
     keep = np.logical_and.reduce([_steady(level, windows) for level in levels])
+    keep = keep if keep.any() else ~keep  # each is loud at some level: then none is an exception
     used = [(level, at) for level in levels if (at := keep[level.window]).sum() >= 3.0 * _together(level.m)]
     counts = np.array([at.sum() / _together(level.m) for level, at in used])
     lags = np.array([_of_lags(parts, level, at) for level, at in used]).reshape(len(used), -1)

@@ -49,6 +49,18 @@ def test_noise_of_a_running_mean_forgets_all_at_once(width: int) -> None:
     assert np.mean(np.abs(np.array(told) - 1.0) < 0.1) >= 0.95
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_where_no_part_of_a_hold_is_as_calm_as_the_others_all_of_it_is_noise(seed: int) -> None:
+    """One part is loud from sample to sample, one over some, one over many: once nothing was left to tell noise by."""
+    rng = np.random.default_rng(seed)
+    e = 0.2 * rng.standard_normal(1200)
+    e[:400] *= 12.0
+    e[400:800] += 3.0 * np.repeat(rng.standard_normal(50), 8)
+    e[800:] += 3.0 * np.repeat(rng.standard_normal(7), 64)[:400]
+    noise = _matched([_about_curve(0.001 * np.arange(1200), e)], 0.001)
+    assert 0.5 < noise.air_N / float(np.std(e)) < 2.0
+
+
 def _flicker(rng: np.random.Generator, n: int, sample_s: float, from_Hz: float) -> np.ndarray:
     """Unit noise (n,) of a power of 1/f from a frequency on, and even below: a cosine of random size and phase at each
     frequency of a record eight times as long."""
