@@ -58,7 +58,8 @@ def test_a_form_whose_valley_is_apart_from_the_best_ones_is_found(seed):
     assert fit.chi2 < 1.1 * search.expected
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3))])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_form_that_no_other_of_its_family_is_like_is_found(seed):
     """A pull of charges, which is there on the way in too and leaks away in air, is nothing to those of bonds."""
     c = draw_case(seed, ("adhesion",), 2.5, "charged", protocol="rich", rate_hz=150.0, jitter="none")
