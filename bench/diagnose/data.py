@@ -320,8 +320,8 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))), shared, stretch,
         _tared(m, grid), Colour(), sample_s,
     )  # fmt: skip
-    moved = 5.0 * float(np.quantile(motion.std_mm, 0.9))
-    owner = _blocks(full, float(np.quantile(stiffness, 0.98)), sigma_force, moved, motion.corners_at(grid))
+    jump_mm = 5.0 * float(np.quantile(motion.std_mm, 0.9))
+    owner = _blocks(full, float(np.quantile(stiffness, 0.98)), sigma_force, jump_mm, motion.corners_at(grid))
     return Prepared(
         name=m.name,
         full=full,

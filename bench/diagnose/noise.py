@@ -239,7 +239,7 @@ def _matched(parts: list[tuple[Array, Array]], sample_s: float) -> ForceNoise:
     keep = keep if keep.any() else ~keep  # each is loud at some level: then none is an exception
     used = [(level, at) for level in levels if (at := keep[level.window]).sum() >= 3.0 * _together(level.m)]
     counts = np.array([at.sum() / _together(level.m) for level, at in used])
-    lags = np.array([_of_lags(parts, level, at) for level, at in used]).reshape(len(used), -1)
+    lags = np.stack([_of_lags(parts, level, at) for level, at in used])
     after_s = sample_s * np.arange(lags.shape[1])
 
     def tail(memory_s: float, frequency_Hz: float = 0.0) -> Array:

@@ -135,6 +135,8 @@ EFFECT = Effect(
             "graded_spline", "monotone curve through nine points, closer near the surface", GRADED_KNOTS, True, 2
         ),
         _spline_form("fine_spline", "monotone curve through fifteen points", FINE_KNOTS, False),
-        _spline_form("fine_graded_spline", "the same, with points closer near the surface", FINE_KNOTS, False, 2),
+        _spline_form(
+            "fine_graded_spline", "monotone curve through fifteen points, closer near the surface", FINE_KNOTS, False, 2
+        ),
     ),
 )

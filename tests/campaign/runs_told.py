@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from bench.diagnose.stuck import runs
+
 FLAGS_GOOD = 0.9
 """Precision and recall that are asked for."""
 
@@ -15,8 +17,7 @@ FLAGS_GOOD = 0.9
 def told_by_runs(force_N: np.ndarray, stuck: np.ndarray) -> np.ndarray:
     """Of the stuck samples (n,) those in runs so long that nine in ten samples that repeat the one before, in runs as
     long or longer, are stuck ones."""
-    first = np.flatnonzero(np.concatenate([[True], force_N[1:] != force_N[:-1]]))
-    length = np.diff(np.concatenate([first, [len(force_N)]]))
+    first, length = runs(force_N)
     own = np.add.reduceat(stuck.astype(int), first)
     order = np.argsort(-length, kind="stable")  # longest first
     by_length = length[order]

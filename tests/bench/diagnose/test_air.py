@@ -51,6 +51,7 @@ def started_and_stopped(seed: int) -> Measurement:
     return Measurement("air", t, at, t, felt)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
 def test_a_mass_is_found_in_a_long_run_without_a_pad(seed: int) -> None:

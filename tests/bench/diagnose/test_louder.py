@@ -75,15 +75,16 @@ def test_noise_of_other_kinds_is_as_loud_everywhere(kind: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "ids",
+    ("ids", "most"),
     [
-        ("friction", "inertia", "sensor_lag"),
-        pytest.param(("cogging", "encoder_error", "resonance", "mains_hum"), marks=pytest.mark.long),
+        (("friction", "inertia", "sensor_lag"), 1),
+        pytest.param(("cogging", "encoder_error", "resonance", "mains_hum"), 0, marks=pytest.mark.long),
     ],
 )
-def test_hardly_any_cause_that_acts_with_the_motion_is_noise(ids: tuple[str, ...]) -> None:
-    """One of some dozens at the most: a mass on a spring may ring as fast as samples come."""
-    assert sum(told(measurement(quiet(seed, (id,), noise_kind="white"))) > 1.0 for id in ids for seed in SEEDS) <= 1
+def test_hardly_any_cause_that_acts_with_the_motion_is_noise(ids: tuple[str, ...], most: int) -> None:
+    """One of 84 at the most: a mass on a spring may ring as fast as samples come."""
+    loud = sum(told(measurement(quiet(seed, (id,), noise_kind="white"))) > 1.0 for id in ids for seed in SEEDS)
+    assert loud <= most
 
 
 def test_a_force_that_is_felt_at_uncertain_times_is_no_louder() -> None:

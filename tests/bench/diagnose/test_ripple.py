@@ -76,6 +76,7 @@ def test_two_waves_of_less_than_a_beat_are_one_that_swells(order: float, period_
     assert not ripple.merged(effect("cogging").form("swelling"), {"period": period_mm}, 3.0)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 4, 5])
 def test_a_ripple_that_goes_with_the_load_has_a_size_and_is_not_two_waves_that_cancel(seed: int) -> None:

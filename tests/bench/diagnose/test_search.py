@@ -369,18 +369,18 @@ def test_one_number_and_a_second_cause_that_leave_nothing_stand_before_a_curve_o
 )
 def test_a_form_with_a_long_way_to_go_is_not_left_behind(id, shape, forms, seeds, least):
     """Each form of a family is carried on for itself: here those that a part of the load, the way or the time goes
-    into. (Oil that warms by an exponential is warmer by a parabola here: of the first form's error a few hundredths
-    stay.)"""
+    into."""
     found = []
     for seed in range(seeds):
         c = draw_case(seed, (id,), 2.0, shape, protocol="staircase", rate_hz=150.0, noise_N=0.003, **QUIET)
-        search, first, fit = in_two_shapes(c, id)
-        left, before = (f.chi2 - search.expected for f in (fit, first))
-        found.append(fit.structure.causes[0].form.name in forms and left < max(0.1 * search.expected, 0.15 * before))
+        search, _, fit = in_two_shapes(c, id)
+        found.append(fit.structure.causes[0].form.name in forms and fit.chi2 < 1.1 * search.expected)
     assert sum(found) >= least
 
 
-@pytest.mark.parametrize(("seeds", "least"), [(1, 1), pytest.param(8, 7, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("seeds", "least"), [(1, 1), *(pytest.param(*n, marks=pytest.mark.long) for n in ((3, 3), (8, 7)))]
+)
 def test_damage_by_what_is_dissipated_is_no_other_damage(seeds, least):
     """It goes on in holds, which no travel does; another form leaves some times as much. From far off, as damage alone
     is from a belief without, now and then no way leads there in one step."""

@@ -58,6 +58,7 @@ def test_the_share_of_the_forces_that_are_felt_on_the_way(hold_s, share):
     assert on_the_way(data([1.0, 2.0, 1.0, 0.0], hold_s)) == pytest.approx(share, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6])
 def test_a_short_ripple_is_found_where_the_pad_is_pressed_to_and_fro(seed):
@@ -99,6 +100,7 @@ def test_one_press_names_nothing_surely_that_acts_with_the_motion(ids):
     assert max(of_motion(diagnosed("friction")[1])) > TOLD_ONCE, "a staircase tells it"
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_one_press_tells_a_hum_all_the_same():
     d = pressed_once("mains_hum", 1)
