@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from bench.fitted_moves import Moves
 from bench.identify.motion import jitter
 from bench.motion_between import missed, motion_between, planned_moves
+from bench.position_noise import position_noise, resolution
 from bench.profiles import Trapezoid
 from sim.jit import compiled
 
@@ -31,7 +32,6 @@ BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
 TOGETHER = 20  # samples that share the error of a window, about
 ASTRAY = 1.4  # times what noise makes of a window's value: so far off is it, in sines of any speed
 WIDTH = 2.2  # standard deviations on either side of a value
-ODD_STEPS = 0.05  # share of the steps between a coarse channel's values that may be less: not all values are its own
 
 
 @compiled("void(float64[::1], float64[::1], float64, float64, int64[::1], int64, float64[::1], float64[::1])")
@@ -94,40 +94,6 @@ def _windows(
                 break
             if error < std[i]:
                 out[i], std[i] = value, error
-
-
-def resolution(values: Array) -> float:
-    """Step of a quantised channel, 0 where its values are (nearly) all different."""
-    levels = np.unique(values)
-    if levels.size < 2 or levels.size > 0.3 * values.size:
-        return 0.0
-    steps = np.diff(levels)
-    steps = steps[steps > 1e-9 * np.ptp(values)]
-    return float(np.quantile(steps, ODD_STEPS, method="lower")) if steps.size else float(np.ptp(values))
-
-
-def position_noise(position_mm: Array) -> float:
-    """Standard deviation of the reported position, rounding included, mm."""
-    step = resolution(position_mm)
-    if step == 0.0 or step > 0.01 * np.ptp(position_mm):
-        return jitter(position_mm)
-    return float(max(jitter(position_mm), _hopping(position_mm, step), step / np.sqrt(12.0)))
-
-
-def _hopping(position_mm: Array, step_mm: float) -> float:
-    """Scatter about short lines, mm, where the motion passes no more than a step of the scale: where readings stay the
-    same for a while the quietest stretches, which `jitter` goes by, have none."""
-    n = len(position_mm) // 6
-    if n < 4:
-        return 0.0
-    windows = position_mm[: 6 * n].reshape(n, 6)
-    t = np.arange(6) - 2.5
-    slope = windows @ t / (t @ t)
-    slow = np.abs(slope) * 5.0 <= step_mm
-    if np.count_nonzero(slow) < 4:
-        return 0.0
-    off = windows[slow] - windows[slow].mean(axis=1, keepdims=True) - slope[slow][:, None] * t
-    return float(np.sqrt(np.sum(off**2) / (4.0 * np.count_nonzero(slow))))
 
 
 def smoothed(time_s: Array, position_mm: Array) -> tuple[Array, Array]:

@@ -26,8 +26,9 @@ from bench.diagnose.asked_again import NEAR
 from bench.diagnose.channel import Faults, faults, standing_off
 from bench.diagnose.data import prepare
 from bench.errors import InputError
-from bench.felt_motion import felt, resolution
+from bench.felt_motion import felt
 from bench.identify.problem import sized
+from bench.position_noise import resolution
 from bench.recording.types import Measurement
 from bench.restamp import restamped
 from sim.grid import union

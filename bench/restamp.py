@@ -17,9 +17,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.felt_motion import _rested, position_noise, smoothed
+from bench.felt_motion import _rested, smoothed
 from bench.fitted_moves import fitted_moves, from_rest
 from bench.motion_between import LEAST, _grouped, _moving
+from bench.position_noise import position_noise
 from bench.profiles import Trapezoid
 from bench.recording.types import Measurement
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.felt_motion import resolution
 from bench.identify.motion import holds
+from bench.position_noise import resolution
 from bench.recording.types import Measurement
 
 from .channel import FEW, Faults, far, not_of_the_motion, of_the_model, resting, standing_off, strays

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
-from bench.felt_motion import resolution
 from bench.identify.motion import holds
+from bench.position_noise import resolution
 from bench.recording.types import Measurement
 
 from .coarse import coarse_repeats

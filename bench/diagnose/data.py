@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import InputError
-from bench.felt_motion import Felt, felt, resolution
+from bench.felt_motion import Felt, felt
 from bench.identify.noise import stiffness_along
 from bench.identify.problem import sized, touches
+from bench.position_noise import resolution
 from bench.recording.types import Measurement
 from bench.restamp import restamped
 from sim.grid import Grid, union

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.felt_motion import resolution
 from bench.identify.motion import holds
+from bench.position_noise import resolution
 from bench.recording.types import Measurement
 
 from .noise import SETTLED_S

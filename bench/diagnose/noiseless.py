@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.felt_motion import resolution
+from bench.position_noise import resolution
 from bench.recording.types import Measurement
 
 from .channel import Faults, resting

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, poisson
 
-from bench.felt_motion import resolution
+from bench.position_noise import resolution
 
 from .coarse import noise_steps
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.felt_motion import position_noise, smoothed
+from bench.felt_motion import smoothed
 from bench.motion_between import planned_moves
+from bench.position_noise import position_noise
 from bench.recording.types import Measurement
 from bench.restamp import restamped
 from tests.bench.diagnose.small import measurement

@@ -34,6 +34,9 @@ SIZES = {"single": (0.05, 2.5), "large": (LARGE, LARGE), "pair": (0.5, 2.0), "ou
 SERVO_S = (0.001, 0.004)
 """Time constants of servos."""
 
+MEMORY = (1.0, 6.0)
+"""Samples over which noise of an encoder that filters lasts."""
+
 
 @dataclass(frozen=True)
 class Item:
@@ -55,10 +58,13 @@ class Item:
         return f"{self.group}/{what}/{how}/{self.seed}"
 
     def case(self) -> Case:
-        """Draw it. In every other one the motor follows its command late, as servos do."""
+        """Draw it. In every other one the motor follows its command late, as servos do; in every fourth noise of the
+        position has a memory."""
         told: dict[str, Any] = {} if self.noise is None else {"noise_kind": self.noise}
         rng = _stream(self.seed, "servo", "", 0)
         told |= {"servo_s": float(rng.uniform(*SERVO_S))} if rng.random() < 0.5 else {}
+        rng = _stream(self.seed, "encoder", "", 0)
+        told |= {"position_memory": float(rng.uniform(*MEMORY))} if rng.random() < 0.25 else {}
         sizes, shapes = (dict(zip(self.ids, values, strict=True)) for values in (self.sizes, self.shapes))
         return draw_case(self.seed, self.ids, sizes, shapes, **told)
 

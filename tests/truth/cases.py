@@ -143,8 +143,9 @@ def draw_case(
     """A case that hides the effects named; `size` None draws 0.3 to 2 for each.
 
     `shape` is one for all that have it, or by id. Overrides: law, contact, protocol, rate_hz, noise_kind, noise_N,
-    position_noise_mm, position_step_mm, jitter ("none", "sampling", "stamp"), own_clock, believed_jitter, drawn (a
-    DrawnPad), motion, servo_s (time constant with which the motor follows, critically damped; 0 if not given).
+    position_noise_mm, position_memory (samples over which noise of the position lasts; 0 if not given),
+    position_step_mm, jitter ("none", "sampling", "stamp"), own_clock, believed_jitter, drawn (a DrawnPad), motion,
+    servo_s (time constant with which the motor follows, critically damped; 0 if not given).
     """
     unknown = set(overrides) - set(_OVERRIDES)
     if unknown:
@@ -207,8 +208,8 @@ def draw_case(
 
 
 _OVERRIDES = (
-    *("law", "contact", "protocol", "rate_hz", "noise_kind", "noise_N", "position_noise_mm", "position_step_mm"),
-    *("jitter", "own_clock", "believed_jitter", "drawn", "motion", "servo_s"),
+    *("law", "contact", "protocol", "rate_hz", "noise_kind", "noise_N", "position_noise_mm", "position_memory"),
+    *("position_step_mm", "jitter", "own_clock", "believed_jitter", "drawn", "motion", "servo_s"),
 )
 
 
@@ -312,7 +313,8 @@ def _record(
     std = float(overrides.get("position_noise_mm", std))
     step = float(channel.choice([0.0, 0.0, 1e-4, 5e-4, 1e-3]))
     step = float(overrides.get("position_step_mm", step))
-    position = reported + std * noises.standard_normal(len(reported))
+    memory_s = float(overrides.get("position_memory", 0.0)) / build.rate_hz
+    position = reported + (Coloured(std, memory_s) if memory_s else White(std)).draw(true, noises)
     if step:
         position = np.round(position / step) * step
     position_std = float(np.hypot(std, step / np.sqrt(12)))

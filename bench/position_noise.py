@@ -1,0 +1,93 @@
+"""How noisy a channel of positions is, and what it is rounded to; found in the data alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from bench.identify.motion import holds, jitter
+
+Array = NDArray[np.float64]
+
+ODD_STEPS = 0.05  # share of the steps between a coarse channel's values that may be less: not all values are its own
+LAGS = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32])  # samples, over which a noise with memory is seen to grow
+ASIDE = 4  # samples at the ends of a hold that may still move
+LONG_ENOUGH = 3 * int(LAGS[-1])  # samples of a hold that tell of a memory
+AS_LOUD = 2.0  # times the growth of a usual hold: more is motion
+GROWS, SURE = 1.1, 5.0  # growth from a lag of one sample to longer ones that is a memory; standard deviations
+AS_IT_FADES = 0.2  # of how the growths differ, that a memory which fades leaves at the most: more is motion
+KEPT = np.array([0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95])  # of a value, one sample on
+
+
+def resolution(values: Array) -> float:
+    """Step of a quantised channel, 0 where its values are (nearly) all different."""
+    levels = np.unique(values)
+    if levels.size < 2 or levels.size > 0.3 * values.size:
+        return 0.0
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-9 * np.ptp(values)]
+    return float(np.quantile(steps, ODD_STEPS, method="lower")) if steps.size else float(np.ptp(values))
+
+
+def position_noise(position_mm: Array) -> float:
+    """Standard deviation of the reported position, rounding included, mm: of noise without memory whose means over many
+    samples scatter as much."""
+    step = resolution(position_mm)
+    if step == 0.0 or step > 0.01 * np.ptp(position_mm):
+        return max(jitter(position_mm), _lasting(position_mm))
+    return float(max(jitter(position_mm), _hopping(position_mm, step), _lasting(position_mm), step / np.sqrt(12.0)))
+
+
+def _lasting(position_mm: Array) -> float:
+    """Of noise that has a memory, mm; 0: it has none.
+
+    A filtered encoder's or a servo's errors last for some samples: neighbours agree, and `jitter`, which goes by short
+    lines, sees half of them. Over the holds half the mean square of differences grows with the lag k as σ_w² +
+    σ_c² (1 − ρ^k) (a variogram: N. Cressie, Statistics for Spatial Data, Wiley 1993, ch. 2); means over many samples
+    scatter as those of noise without memory of σ² = σ_w² + σ_c² (1 + ρ)/(1 − ρ) do.
+    """
+    grown, count = _growth(position_mm)
+    if count == 0 or grown[0] == 0.0:
+        return 0.0
+    longer = float(np.mean(grown[len(LAGS) // 2 :]))
+    if longer < (GROWS + SURE * np.sqrt(len(LAGS) / (4.0 * count))) * grown[0]:
+        return 0.0
+    fits = [(kept, *nnls(np.stack([np.ones(len(LAGS)), 1.0 - kept**LAGS], axis=1), grown)) for kept in KEPT]
+    kept, (white, coloured), left = min(fits, key=lambda fit: float(fit[2]))
+    if left > AS_IT_FADES * float(np.linalg.norm(grown - grown.mean())):
+        return 0.0
+    return float(np.sqrt(white + coloured * (1.0 + kept) / (1.0 - kept)))
+
+
+def _growth(position_mm: Array) -> tuple[Array, int]:
+    """Half the mean squares of differences over `LAGS` within holds (lags,), mm², and the samples they are of."""
+    squares, counts = [], []
+    for hold in holds(np.arange(len(position_mm), dtype=np.float64), position_mm):
+        x = position_mm[hold.start + ASIDE : hold.stop - ASIDE]
+        if len(x) >= LONG_ENOUGH:
+            squares.append([0.5 * np.mean((x[lag:] - x[:-lag]) ** 2) for lag in LAGS.tolist()])
+            counts.append(len(x))
+    if not counts:
+        return np.zeros(len(LAGS)), 0
+    all_squares, all_counts = np.array(squares), np.array(counts)
+    by_size = np.argsort(all_squares[:, -1])
+    half = np.searchsorted(np.cumsum(all_counts[by_size]), 0.5 * all_counts.sum())
+    usual = all_squares[:, -1] <= AS_LOUD * all_squares[by_size[half], -1]
+    return all_counts[usual] @ all_squares[usual] / all_counts[usual].sum(), int(all_counts[usual].sum())
+
+
+def _hopping(position_mm: Array, step_mm: float) -> float:
+    """Scatter about short lines, mm, where the motion passes no more than a step of the scale: where readings stay the
+    same for a while the quietest stretches, which `jitter` goes by, have none."""
+    n = len(position_mm) // 6
+    if n < 4:
+        return 0.0
+    windows = position_mm[: 6 * n].reshape(n, 6)
+    t = np.arange(6) - 2.5
+    slope = windows @ t / (t @ t)
+    slow = np.abs(slope) * 5.0 <= step_mm
+    if np.count_nonzero(slow) < 4:
+        return 0.0
+    off = windows[slow] - windows[slow].mean(axis=1, keepdims=True) - slope[slow][:, None] * t
+    return float(np.sqrt(np.sum(off**2) / (4.0 * np.count_nonzero(slow))))
