@@ -47,23 +47,34 @@ def _lasting(position_mm: Array) -> float:
     σ_c² (1 − ρ^k) (a variogram: N. Cressie, Statistics for Spatial Data, Wiley 1993, ch. 2); means over many samples
     scatter as those of noise without memory of σ² = σ_w² + σ_c² (1 + ρ)/(1 − ρ) do.
     """
-    grown, count = _growth(position_mm)
-    if count == 0 or grown[0] == 0.0:
+    seen = _memory(position_mm, jitter(position_mm))
+    if seen is None:
         return 0.0
-    longer = float(np.mean(grown[len(LAGS) // 2 :]))
-    if longer < (GROWS + SURE * np.sqrt(len(LAGS) / (4.0 * count))) * grown[0]:
-        return 0.0
-    fits = [(kept, *nnls(np.stack([np.ones(len(LAGS)), 1.0 - kept**LAGS], axis=1), grown)) for kept in KEPT]
-    kept, (white, coloured), left = min(fits, key=lambda fit: float(fit[2]))
-    if left > AS_IT_FADES * float(np.linalg.norm(grown - grown.mean())):
-        return 0.0
+    # holds were cut where louder noise than was known of ran out of them
+    white, coloured, kept = _memory(position_mm, float(np.sqrt(seen[0] + seen[1]))) or seen
     return float(np.sqrt(white + coloured * (1.0 + kept) / (1.0 - kept)))
 
 
-def _growth(position_mm: Array) -> tuple[Array, int]:
-    """Half the mean squares of differences over `LAGS` within holds (lags,), mm², and the samples they are of."""
+def _memory(position_mm: Array, noise_mm: float) -> tuple[float, float, float] | None:
+    """(σ_w², mm²; σ_c², mm²; ρ) of holds with some noise; None: there is no memory."""
+    grown, count = _growth(position_mm, noise_mm)
+    if count == 0 or grown[0] == 0.0:
+        return None
+    longer = float(np.mean(grown[len(LAGS) // 2 :]))
+    if longer < (GROWS + SURE * np.sqrt(len(LAGS) / (4.0 * count))) * grown[0]:
+        return None
+    fits = [(kept, *nnls(np.stack([np.ones(len(LAGS)), 1.0 - kept**LAGS], axis=1), grown)) for kept in KEPT]
+    kept, (white, coloured), left = min(fits, key=lambda fit: float(fit[2]))
+    if left > AS_IT_FADES * float(np.linalg.norm(grown - grown.mean())):
+        return None
+    return float(white), float(coloured), float(kept)
+
+
+def _growth(position_mm: Array, noise_mm: float) -> tuple[Array, int]:
+    """Half the mean squares of differences over `LAGS` within holds with some noise (lags,), mm², and of how many
+    samples they are."""
     squares, counts = [], []
-    for hold in holds(np.arange(len(position_mm), dtype=np.float64), position_mm):
+    for hold in holds(np.arange(len(position_mm), dtype=np.float64), position_mm, noise_mm):
         x = position_mm[hold.start + ASIDE : hold.stop - ASIDE]
         if len(x) >= LONG_ENOUGH:
             squares.append([0.5 * np.mean((x[lag:] - x[:-lag]) ** 2) for lag in LAGS.tolist()])

@@ -71,13 +71,13 @@ def _level(position: Array) -> float:
     return float(np.median(position[:: max(1, len(position) // ENOUGH)]))
 
 
-def holds(time_s: Array, position: Array) -> list[slice]:
-    """Stretches where the position stays put: at least eight samples within its noise, and no trend.
+def holds(time_s: Array, position: Array, noise: float | None = None) -> list[slice]:
+    """Stretches where the position stays put: at least eight samples within its noise (None: `jitter`), and no trend.
 
     A slow ramp also stays within a tolerance for a while; it is told by its two ends, which differ by more than
     the noise lets their means differ.
     """
-    noise = jitter(position)
+    noise = jitter(position) if noise is None else noise
     reach = float(np.ptp(position))
     tolerance = max(8 * noise, 5e-4 * reach)
     out: list[slice] = []
