@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bench.fitted_moves import Moves
 from bench.identify.motion import jitter
 from bench.motion_between import missed, motion_between, planned_moves
-from bench.position_noise import position_noise, resolution
+from bench.position_noise import PositionNoise, position_noise, resolution
 from bench.profiles import Trapezoid
 from sim.jit import compiled
 
@@ -34,11 +34,20 @@ ASTRAY = 1.4  # times what noise makes of a window's value: so far off is it, in
 WIDTH = 2.2  # standard deviations on either side of a value
 
 
-@compiled("void(float64[::1], float64[::1], float64, float64, int64[::1], int64, float64[::1], float64[::1])")
+@compiled("void(float64[::1], float64[::1], float64, float64, float64, int64[::1], int64, float64[::1], float64[::1])")
 def _windows(
-    t: Array, x: Array, sigma: float, width: float, reaches: NDArray[np.int64], side: int, out: Array, std: Array
+    t: Array,
+    x: Array,
+    sigma: float,
+    memory: float,
+    width: float,
+    reaches: NDArray[np.int64],
+    side: int,
+    out: Array,
+    std: Array,
 ) -> None:
-    """Values by windows around each sample (`side` 0), after it (1) or before it (−1), where they are surer."""
+    """Values by windows around each sample (`side` 0), after it (1) or before it (−1), where they are surer; of noise
+    `sigma`, of which `memory` samples say the same as one."""
     n = t.shape[0]
     for i in range(n):
         low, high = x[i] - width * sigma, x[i] + width * sigma
@@ -85,10 +94,10 @@ def _windows(
             p2 = (c02 * b0 + c12 * b1 + c22 * b2) / det
             left = xx - p0 * b0 - p1 * b1 - p2 * b2
             freedom = s0 - 3.0
-            if left > sigma * sigma * (freedom + 2.6 * np.sqrt(2.0 * freedom)):
+            if left > sigma * sigma * (freedom + 2.6 * np.sqrt(2.0 * freedom * memory)):
                 break
             value = x[i] + p0
-            error = sigma * np.sqrt(c00 / det)
+            error = sigma * np.sqrt(memory * c00 / det)
             low, high = max(low, value - width * error), min(high, value + width * error)
             if low > high:
                 break
@@ -96,26 +105,26 @@ def _windows(
                 out[i], std[i] = value, error
 
 
-def smoothed(time_s: Array, position_mm: Array) -> tuple[Array, Array]:
+def smoothed(time_s: Array, position_mm: Array, noise: PositionNoise) -> tuple[Array, Array]:
     """(positions without most of their noise (n,), standard deviation of what is left (n,)), mm.
 
     `time_s` (n,) increases strictly. Positions without noise come back as they are.
     """
-    sigma = position_noise(position_mm)
+    sigma = noise.each_mm
     if sigma <= 1e-7 * max(float(np.ptp(position_mm)), 1e-9) or len(time_s) < 8:
         return position_mm, np.zeros(len(position_mm))
     time, position = np.ascontiguousarray(time_s), np.ascontiguousarray(position_mm)
     out, std = position.copy(), np.full(len(time), sigma)
     for side in (0, 1, -1):
-        _windows(time, position, sigma, WIDTH, REACHES, side, out, std)
+        _windows(time, position, sigma, noise.memory, WIDTH, REACHES, side, out, std)
     return out, std
 
 
 @dataclass(frozen=True)
 class Felt:
     """The motion as the pad felt it: `time_s`, `position_mm` (k,) with nodes between samples where they matter;
-    `std_mm` (k,): what is left of the noise; `noise_mm`: what it was. `stretch` (k,): nodes of one number share most of
-    the error that is left. `rest` (k,): number of the rest, 0: in motion."""
+    `std_mm` (k,): what is left of the noise; `noise_mm`: what it was, of means. `stretch` (k,): nodes of one number
+    share most of the error that is left. `rest` (k,): number of the rest, 0: in motion."""
 
     time_s: Array
     position_mm: Array
@@ -158,7 +167,7 @@ def _coarse(position_mm: Array) -> float:
 
 
 def _rested(
-    position_mm: Array, clean_mm: Array, std_mm: Array, noise_mm: float, left_mm: float
+    position_mm: Array, clean_mm: Array, std_mm: Array, noise: PositionNoise, left_mm: float
 ) -> tuple[Array, Array, NDArray[np.intp]]:
     """Positions (n,), their standard deviations (n,): one for each hold whose samples are that of one, or for each
     of the levels between which it creeps; and the number of the level, from 1 on; 0: none."""
@@ -167,7 +176,7 @@ def _rested(
     coarse, reached = _coarse(position_mm) > 0.0, dict[float, int]()
     # a coarse scale hops between two levels, and neither says which of them is nearer
     hop = resolution(position_mm) if coarse else 0.0
-    noise_mm = max(noise_mm, 0.5 * hop)
+    each_mm, noise_mm = max(noise.each_mm, 0.5 * hop), max(noise.of_means_mm, 0.5 * hop)
     quiet_mm = max(6 * left_mm, 1e-5 * float(np.ptp(clean_mm)), 0.6 * hop)
     numbered = 0
     for a, b in _rests(position_mm, clean_mm, noise_mm, quiet_mm):
@@ -176,7 +185,7 @@ def _rested(
         if n < SHORTEST:
             continue
         level = float(inside.mean())
-        if float(np.sum((inside - level) ** 2)) > noise_mm**2 * (n + 4.0 * np.sqrt(2.0 * n)):
+        if float(np.sum((inside - level) ** 2)) > each_mm**2 * (n + 4.0 * np.sqrt(2.0 * n * noise.memory)):
             continue
         halves = abs(float(inside[: n // 2].mean() - inside[n // 2 :].mean())) / (2.0 * noise_mm / np.sqrt(n))
         cuts = [] if coarse else _steps((inside - level) / noise_mm)
@@ -289,7 +298,7 @@ def settled(time_s: Array, position_mm: Array) -> Array:
 @dataclass(frozen=True)
 class _Settled:
     """Smoothed positions (n,) with each rest at its level, their standard deviations (n,), the number of the rest (n,),
-    0: in motion; what is left of the noise of all, and that noise, mm."""
+    0: in motion; what is left of the noise of all, and that noise, of means, mm."""
 
     clean_mm: Array
     std_mm: Array
@@ -304,12 +313,13 @@ class _Settled:
 
 
 def _settled(time_s: Array, position_mm: Array) -> _Settled:
-    clean, std = smoothed(time_s, position_mm)
+    noise = position_noise(position_mm)
+    clean, std = smoothed(time_s, position_mm, noise)
     left = float(np.median(std)) if len(std) else 0.0
-    found = _Settled(clean, std, np.zeros(len(clean), dtype=np.intp), left, position_noise(position_mm))
+    found = _Settled(clean, std, np.zeros(len(clean), dtype=np.intp), left, noise.of_means_mm)
     if not found.smoother:
         return found
-    clean, std, hold = _rested(position_mm, clean, std, found.noise_mm, left)
+    clean, std, hold = _rested(position_mm, clean, std, noise, left)
     return replace(found, clean_mm=clean, std_mm=std, hold=hold)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
@@ -30,29 +32,40 @@ def resolution(values: Array) -> float:
     return float(np.quantile(steps, ODD_STEPS, method="lower")) if steps.size else float(np.ptp(values))
 
 
-def position_noise(position_mm: Array) -> float:
-    """Standard deviation of the reported position, rounding included, mm: of noise without memory whose means over many
-    samples scatter as much."""
-    step = resolution(position_mm)
-    if step == 0.0 or step > 0.01 * np.ptp(position_mm):
-        return max(jitter(position_mm), _lasting(position_mm))
-    return float(max(jitter(position_mm), _hopping(position_mm, step), _lasting(position_mm), step / np.sqrt(12.0)))
+@dataclass(frozen=True)
+class PositionNoise:
+    """Standard deviations of reported positions, rounding included, mm: of each sample, and of noise without memory
+    whose means over many samples scatter as much."""
+
+    each_mm: float
+    of_means_mm: float
+
+    @property
+    def memory(self) -> float:
+        """Samples that say the same as one."""
+        return (self.of_means_mm / self.each_mm) ** 2 if self.each_mm > 0.0 else 1.0
 
 
-def _lasting(position_mm: Array) -> float:
-    """Of noise that has a memory, mm; 0: it has none.
+def position_noise(position_mm: Array) -> PositionNoise:
+    """How noisy positions (n,) are, as short lines tell, rounding and holds.
 
     A filtered encoder's or a servo's errors last for some samples: neighbours agree, and `jitter`, which goes by short
     lines, sees half of them. Over the holds half the mean square of differences grows with the lag k as σ_w² +
     σ_c² (1 − ρ^k) (a variogram: N. Cressie, Statistics for Spatial Data, Wiley 1993, ch. 2); means over many samples
     scatter as those of noise without memory of σ² = σ_w² + σ_c² (1 + ρ)/(1 − ρ) do.
     """
-    seen = _memory(position_mm, jitter(position_mm))
+    short = jitter(position_mm)
+    step = resolution(position_mm)
+    if 0.0 < step <= 0.01 * np.ptp(position_mm):
+        short = max(short, _hopping(position_mm, step), step / np.sqrt(12.0))
+    seen = _memory(position_mm, short)
     if seen is None:
-        return 0.0
+        return PositionNoise(float(short), float(short))
     # holds were cut where louder noise than was known of ran out of them
     white, coloured, kept = _memory(position_mm, float(np.sqrt(seen[0] + seen[1]))) or seen
-    return float(np.sqrt(white + coloured * (1.0 + kept) / (1.0 - kept)))
+    return PositionNoise(
+        float(np.sqrt(white + coloured)), float(np.sqrt(white + coloured * (1.0 + kept) / (1.0 - kept)))
+    )
 
 
 def _memory(position_mm: Array, noise_mm: float) -> tuple[float, float, float] | None:

@@ -74,7 +74,7 @@ def even_times(time_s: Array, position_mm: Array) -> Array | None:
     )  # fmt: skip
     if off < TICK * step or float(np.abs(time_s - even).max()) > 0.5 * step:
         return None
-    noise = position_noise(position_mm)
+    noise = position_noise(position_mm).of_means_mm
     start = np.arange(0, len(slot) - WINDOW + 1)
     speed = np.abs(position_mm[start + WINDOW - 1] - position_mm[start]) / (step * (WINDOW - 1))
     in_a_row = slot[start + WINDOW - 1] - slot[start] == WINDOW - 1
@@ -104,12 +104,13 @@ def stamp_errors(time_s: Array, position_mm: Array) -> Array | None:
 
     `time_s` (n,) increases strictly.
     """
-    noise = position_noise(position_mm)
-    clean, std = smoothed(time_s, position_mm)
+    position = position_noise(position_mm)
+    noise = position.of_means_mm
+    clean, std = smoothed(time_s, position_mm, position)
     left, reach = float(np.median(std)), float(np.ptp(clean))
     if not 0.0 < left <= noise or not reach > 0.0:
         return None
-    clean, _, _ = _rested(position_mm, clean, std, noise, left)
+    clean, _, _ = _rested(position_mm, clean, std, position, left)
     step = np.diff(time_s)
     moving, _ = _moving(clean, reach, noise)  # slower ones tell nothing
     groups = [g for g in _grouped(moving, moving) if g[1] - g[0] >= LEAST and from_rest(moving, clean, g)]

@@ -104,8 +104,9 @@ def test_moves_between_noisy_rests_are_found() -> None:
             position_noise_mm=6e-4,
         )  # fmt: skip
         m = measurement(c)
-        clean, std = smoothed(m.position_time_s, m.position_mm)
-        noise, left = position_noise(m.position_mm), float(np.median(std))
+        read = position_noise(m.position_mm)
+        clean, std = smoothed(m.position_time_s, m.position_mm, read)
+        noise, left = read.of_means_mm, float(np.median(std))
         found = planned_moves(m.position_time_s, m.position_mm, clean, noise, left)
         at = c.truth.motion.breaks_s
         speed = np.abs(c.truth.motion.velocity(0.5 * (at[1:] + at[:-1])))
