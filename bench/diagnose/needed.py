@@ -171,21 +171,26 @@ def _doubtful(
     """Number of a further cause whose name is hardly sure, and that takes little, and less than is left: what left the
     one may have left the other. Or whose name is most likely another, and that takes no large part. Or of one that
     takes next to nothing, and far less than the noise, under a name that may be another, where the rest is as good as
-    explained without it: no shape is exact, and what it misses looks like something. `apart`: what a channel's faults
+    explained without it: no shape is exact, and what it misses looks like something. So does any that is now more and
+    now less in time, which may follow what the others' shapes miss wherever it stands. `apart`: what a channel's faults
     take (N²); where that is most, the first cause beside them is a further one too."""
-    named = [c.id for c in fits[-1].structure.causes[len(fits[0].structure.causes) :]]
+    causes = fits[-1].structure.causes[len(fits[0].structure.causes) :]
+    named = [c.id for c in causes]
     whole = excess[0] + apart
     for k in range(len(fits) - 1, 0 if apart > excess[0] else 1, -1):
         _, confidence, kind = sureness(path, named[k - 1], named)
         sure = max(confidence, kind)
         taken, trace = excess[k - 1] - excess[k], TRACE * excess[0]
+        nearly_all = taken + excess[-1] < 2.0 * trace
+        if causes[k - 1].form.has_a_course and taken < trace and nearly_all:
+            return k - 1
         if k == 1 and taken >= FAINT * floor_N**2:
             continue
         if sure < DOUBTED and _takes_little(excess, k, whole, slow[k - 1]):
             return k - 1
         if sure < UNLIKELY and taken < A_FIFTH * whole:
             return k - 1
-        if sure < NAMED and taken < min(trace, FAINT * floor_N**2) and taken + excess[-1] < 2.0 * trace:
+        if sure < NAMED and taken < min(trace, FAINT * floor_N**2) and nearly_all:
             return k - 1
         if sure < DOUBTED and taken < min(OF_A_GIANT * excess[0], NO_LESS * excess[-1]):
             return k - 1

@@ -153,6 +153,25 @@ def test_where_the_shape_does_harm_the_cause_stays_in_one_that_does_none(monkeyp
 
 
 @pytest.mark.parametrize(
+    ("course", "excess", "gone"),
+    [
+        (True, [1.0, 0.02, 0.001], 1),
+        (False, [1.0, 0.02, 0.001], None),
+        (True, [1.0, 0.2, 0.001], None),
+        (True, [1.0, 0.14, 0.1], None),
+    ],
+    ids=["follows what another misses", "has no course", "takes much", "much is left"],
+)
+def test_what_has_any_course_in_time_must_take_a_part_beside_another(monkeypatch, course, excess, gone):
+    """A drift that wanders follows what a bristle's shape misses, one time this way and one time that."""
+    monkeypatch.setattr(module, "sureness", lambda path, id, named: (None, 0.9, 0.9))
+    causes = [SimpleNamespace(id=i, form=SimpleNamespace(has_a_course=c)) for i, c in (("a", False), ("b", course))]
+    fits: list[Any] = [SimpleNamespace(structure=SimpleNamespace(causes=causes[:k])) for k in range(3)]
+    path: Any = None
+    assert module._doubtful(path, fits, excess, 0.0, 1e-3, [0.0, 0.0]) == gone
+
+
+@pytest.mark.parametrize(
     ("sizes", "excess", "gone"),
     [
         ([1.0, 0.2], [1.0, 0.1, 0.07], 1),
