@@ -73,6 +73,17 @@ def test_hidden_effects_are_named(group, turn, tmp_path):
     assert len(wrong) <= len(asked) // 3, wrong
 
 
+@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 12), marks=pytest.mark.long)])
+def test_noise_of_the_position_that_lasts_is_no_play(seeds, tmp_path):
+    """A play that follows an encoder's filtered noise later takes some of it away."""
+    said = {}
+    for seed in seeds:
+        case = null_case(seed, rate_hz=400.0, position_noise_mm=1.5e-3, position_step_mm=0.0, position_memory=3.0)
+        said[seed] = diagnosed(case, case.write(tmp_path / str(seed)))["said"]
+    alarms = {seed: [c["id"] for c in s["causes"]] for seed, s in said.items() if s["verdict"] != "consistent"}
+    assert len(alarms) <= len(seeds) // 4, alarms
+
+
 @pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 8), marks=pytest.mark.long)])
 def test_nothing_hidden_is_consistent(seeds, tmp_path):
     said = {}
