@@ -71,7 +71,7 @@ def position_noise(position_mm: Array) -> PositionNoise:
 def _memory(position_mm: Array, noise_mm: float) -> tuple[float, float, float] | None:
     """(σ_w², mm²; σ_c², mm²; ρ) of holds with some noise; None: there is no memory."""
     grown, count = _growth(position_mm, noise_mm)
-    if count == 0 or grown[0] == 0.0:
+    if count == 0 or grown[0] == 0.0 or not np.isfinite(grown).all():  # numbers of no bench are refused later
         return None
     longer = float(np.mean(grown[len(LAGS) // 2 :]))
     if longer < (GROWS + SURE * np.sqrt(len(LAGS) / (4.0 * count))) * grown[0]:
@@ -90,7 +90,8 @@ def _growth(position_mm: Array, noise_mm: float) -> tuple[Array, int]:
     for hold in holds(np.arange(len(position_mm), dtype=np.float64), position_mm, noise_mm):
         x = position_mm[hold.start + ASIDE : hold.stop - ASIDE]
         if len(x) >= LONG_ENOUGH:
-            squares.append([0.5 * np.mean((x[lag:] - x[:-lag]) ** 2) for lag in LAGS.tolist()])
+            with np.errstate(over="ignore"):
+                squares.append([0.5 * np.mean((x[lag:] - x[:-lag]) ** 2) for lag in LAGS.tolist()])
             counts.append(len(x))
     if not counts:
         return np.zeros(len(LAGS)), 0

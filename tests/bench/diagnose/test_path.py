@@ -26,7 +26,7 @@ NOISE = 1000.0
 def fit(chi2: float, *ids: str) -> Any:
     """A fit of causes by their ids, each with the name of its form behind a stroke where that is not the first."""
     pairs = [i.partition("/") for i in ids]
-    causes = tuple(SimpleNamespace(id=i, form=SimpleNamespace(name=name)) for i, _, name in pairs)
+    causes = tuple(SimpleNamespace(id=i, form=SimpleNamespace(name=name, has_a_course=False)) for i, _, name in pairs)
     return SimpleNamespace(chi2=chi2, structure=SimpleNamespace(causes=causes), free=len(ids))
 
 
