@@ -28,12 +28,20 @@ def test_a_block_with_the_greatest_forces_is_not_predicted_by_a_limit_that_the_o
         soft = cause_of(effect("saturation"), effect("saturation").form("soft"), {"limit": limit, "sharpness": 20.0})
         joined = structure.with_cause(soft)
         fit = onto(refit(p.short, joined, joined.x(structure.pad.x()), 60, 1e-9), p.full)
-        monkeypatch.setattr(held_out, "AT_THE_TOP", "saturation")
         known = held_out_square(p, fit)
         assert known < 1.2 * p.floor_N**2
-        monkeypatch.setattr(held_out, "AT_THE_TOP", "nothing")
-        worse.append(held_out_square(p, fit) / known)
+        with monkeypatch.context() as patched:
+            patched.setattr(held_out, "BY_ITSELF", {})
+            worse.append(held_out_square(p, fit) / known)
     assert sum(w > 1.5 for w in worse) >= 2, worse
+
+
+def test_a_rest_at_which_a_bond_has_snapped_is_not_predicted_by_where_the_others_would_snap():
+    """A case in which a campaign found nothing: a neck bears more the quicker it is opened, which no shape knows with
+    just this range, and one of four rests is about where it snaps. That is rare: none of twelve such draws had one."""
+    c = draw_case(1332802654, ("adhesion",), 2.5, "by_rate", position_memory=1.6647384886789187)
+    found = diagnose(measurement(c), Model.from_dict(c.believed))
+    assert [cause.id for cause in found.causes] == ["adhesion"] and found.verdict == "explained"
 
 
 @pytest.mark.long
