@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
+from bench.amounts import amounts
 from bench.identify.motion import holds, jitter
 
 Array = NDArray[np.float64]
@@ -76,7 +76,7 @@ def _memory(position_mm: Array, noise_mm: float) -> tuple[float, float, float] |
     longer = float(np.mean(grown[len(LAGS) // 2 :]))
     if longer < (GROWS + SURE * np.sqrt(len(LAGS) / (4.0 * count))) * grown[0]:
         return None
-    fits = [(kept, *nnls(np.stack([np.ones(len(LAGS)), 1.0 - kept**LAGS], axis=1), grown)) for kept in KEPT]
+    fits = [(kept, *amounts(np.stack([np.ones(len(LAGS)), 1.0 - kept**LAGS], axis=1), grown)) for kept in KEPT]
     kept, (white, coloured), left = min(fits, key=lambda fit: float(fit[2]))
     if left > AS_IT_FADES * float(np.linalg.norm(grown - grown.mean())):
         return None

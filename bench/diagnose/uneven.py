@@ -11,7 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
+
+from bench.amounts import amounts as nearest
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,6 @@ def likeliest(columns: Array, found: Array, weight: Array) -> tuple[Array, float
     expected, amounts = found, np.zeros(columns.shape[1])
     for _ in range(6):
         scale = np.sqrt(weight) / expected
-        amounts = np.asarray(nnls(columns * scale[:, None], found * scale)[0])
+        amounts, _ = nearest(columns * scale[:, None], found * scale)
         expected = np.maximum(columns @ amounts, 1e-6 * found)
     return amounts, float(np.sum(weight * (np.log(expected / found) + found / expected - 1.0)))
