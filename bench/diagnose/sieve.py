@@ -38,6 +38,10 @@ AS_LATE = 0.9  # of the best gain: what makes the force late and takes so much b
 FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the least
 HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
 AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
+PROMISES, KEEPS = (
+    0.5,
+    0.5,
+)  # of what a fit leaves unexplained; of its promise: a start that keeps less takes other steps
 NEAR = 2.0  # times χ² before: another law that is no farther off after a few steps takes more
 KNEES = ("soft",)  # forms that say more than that the greatest forces are at a ceiling
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
@@ -243,7 +247,7 @@ class Sieve:
             if np.isfinite(s.promise) and seen < 2 and sum(forms_seen.values()) < most:
                 forms_seen[s.cause.form.name] = seen + 1
                 chosen.append(s)
-        joined = [self._joined(fit, s.cause, FEW, signatures.jacobian) for s in chosen if s.pad is None]
+        joined = [self._kept(fit, s, signatures.jacobian) for s in chosen if s.pad is None]
         # another law begins beside the fit and not at it: it takes more steps to tell what it is worth
         near = [t is not None and t.cause.form.amend is not None and t.fit.chi2 < NEAR * fit.chi2 for t in joined]
         tried = [self._carried(t, MORE) if close else t for t, close in zip(joined, near, strict=True) if t is not None]
@@ -255,6 +259,18 @@ class Sieve:
                 again = self._solved(structure, x, MORE, None)
                 tried += [] if again is None else [self._falling(again)]
         return sorted(tried, key=lambda t: t.score)
+
+    def _kept(self, fit: Fit, start: Start, known: Array) -> Trial | None:
+        """A few steps from a start, the sensitivities of the pad's numbers known. Where it promises to explain what is
+        left, and does not keep that, it has changed them: a frame's way is most of the pad's in another place."""
+        trial = self._joined(fit, start.cause, FEW, known)
+        left = unexplained(fit.chi2, self.expected)
+        if trial is None or not PROMISES * left < start.promise < np.inf or left == 0.0:
+            return trial
+        if fit.chi2 - trial.fit.chi2 > KEEPS * min(start.promise, left):
+            return trial
+        other = self._joined(fit, start.cause, FEW, None)
+        return other if other is not None and other.score < trial.score else trial
 
     def _widened(
         self, fit: Fit, trials: list[Trial], found: list[Start], family: list[Form], known: Array
