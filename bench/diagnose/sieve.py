@@ -38,10 +38,7 @@ AS_LATE = 0.9  # of the best gain: what makes the force late and takes so much b
 FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the least
 HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
 AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
-PROMISES, KEEPS = (
-    0.5,
-    0.5,
-)  # of what a fit leaves unexplained; of its promise: a start that keeps less takes other steps
+PROMISES, KEEPS = 0.5, 0.5  # of what is left unexplained; and of its promise: a start that keeps less steps anew
 NEAR = 2.0  # times χ² before: another law that is no farther off after a few steps takes more
 KNEES = ("soft",)  # forms that say more than that the greatest forces are at a ceiling
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
