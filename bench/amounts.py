@@ -15,13 +15,15 @@ def amounts(columns: Array, wanted: Array) -> tuple[Array, float]:
     An active set that comes back to itself, as rounding may make it, ends in an error of `nnls`; a search within bounds
     ends near the same amounts.
     """
-    size, length = np.linalg.norm(columns, axis=0), float(np.linalg.norm(wanted))
-    unit = columns / np.where(size > 0.0, size, 1.0)
+    length = float(np.linalg.norm(wanted))
     if length == 0.0:
         return np.zeros(columns.shape[1]), 0.0
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0.0, size, 1.0)
+    unit = columns / size, wanted / length
     try:
-        found = np.asarray(nnls(unit, wanted / length)[0])
+        found = np.asarray(nnls(*unit)[0])
     except RuntimeError:
-        found = np.asarray(lsq_linear(unit, wanted / length, bounds=(0.0, np.inf), tol=1e-12).x)
-    found = found * length / np.where(size > 0.0, size, 1.0)
+        found = np.asarray(lsq_linear(*unit, bounds=(0.0, np.inf), tol=1e-12).x)
+    found = found * length / size
     return found, float(np.linalg.norm(columns @ found - wanted))

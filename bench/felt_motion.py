@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bench.fitted_moves import Moves
 from bench.identify.motion import jitter
 from bench.motion_between import missed, motion_between, planned_moves
-from bench.position_noise import PositionNoise, position_noise, resolution
+from bench.position_noise import EDGE, PositionNoise, position_noise, resolution
 from bench.profiles import Trapezoid
 from sim.jit import compiled
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 REACHES = np.array([2, 3, 4, 6, 8, 11, 15, 21, 29, 40, 56, 80, 112, 160], dtype=np.int64)
 """Half-widths of the windows, in samples."""
-SHORTEST, EDGE = 30, 4  # samples of a hold that can show it to be at rest; samples at its ends that may still move
+SHORTEST = 30  # samples of a hold that can show it to be at rest
 LIKELY, CHANCE = 4.0, 5.0  # standard deviations: levels nearer are one, samples farther off are no noise
 FEWEST = 10  # samples of a level within a hold
 BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 ODD_STEPS = 0.05  # share of the steps between a coarse channel's values that may be less: not all values are its own
 LAGS = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32])  # samples, over which a noise with memory is seen to grow
-ASIDE = 4  # samples at the ends of a hold that may still move
+EDGE = 4  # samples at the ends of a hold that may still move
 LONG_ENOUGH = 3 * int(LAGS[-1])  # samples of a hold that tell of a memory
 AS_LOUD = 2.0  # times the growth of a usual hold: more is motion
 GROWS, SURE = 1.1, 5.0  # growth from a lag of one sample to longer ones that is a memory; standard deviations
@@ -88,7 +88,7 @@ def _growth(position_mm: Array, noise_mm: float) -> tuple[Array, int]:
     samples they are."""
     squares, counts = [], []
     for hold in holds(np.arange(len(position_mm), dtype=np.float64), position_mm, noise_mm):
-        x = position_mm[hold.start + ASIDE : hold.stop - ASIDE]
+        x = position_mm[hold.start + EDGE : hold.stop - EDGE]
         if len(x) >= LONG_ENOUGH:
             with np.errstate(over="ignore"):
                 squares.append([0.5 * np.mean((x[lag:] - x[:-lag]) ** 2) for lag in LAGS.tolist()])

@@ -262,9 +262,9 @@ class Sieve:
         left, and does not keep that, it has changed them: a frame's way is most of the pad's in another place."""
         trial = self._joined(fit, start.cause, FEW, known)
         left = unexplained(fit.chi2, self.expected)
-        if trial is None or not PROMISES * left < start.promise < np.inf or left == 0.0:
-            return trial
-        if fit.chi2 - trial.fit.chi2 > KEEPS * min(start.promise, left):
+        promised = min(start.promise, left)
+        told = np.isfinite(start.promise) and promised > PROMISES * left
+        if trial is None or not told or fit.chi2 - trial.fit.chi2 > KEEPS * promised:
             return trial
         other = self._joined(fit, start.cause, FEW, None)
         return other if other is not None and other.score < trial.score else trial
@@ -310,7 +310,7 @@ class Sieve:
         best = max(own, key=lambda s: s.promise, default=None)
         if best is None or best.promise < AS_GOOD * max(s.promise for s in found):
             return None
-        return self._joined(fit, best.cause, FEW, known)
+        return self._kept(fit, best, known)
 
     def _falling(self, trial: Trial) -> Trial:
         """More steps, and again while they take much: a form from its own start has a longer way than from another's
