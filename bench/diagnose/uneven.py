@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 FEWEST = 5  # holds that tell of it
 APART = 3.0  # squares of second differences that say as much as one of noise whose tails may be heavy
-PAYS = 60.0  # twice the log-likelihood that it must gain over noise that is the same at all forces …
+PAYS = 30.0  # twice the log-likelihood that it must gain over noise that is the same at all forces …
 MOST = 0.7  # … and the share of what holds of one loudness leave of that
 
 
