@@ -123,13 +123,13 @@ def smoothed(time_s: Array, position_mm: Array, noise: PositionNoise) -> tuple[A
 @dataclass(frozen=True)
 class Felt:
     """The motion as the pad felt it: `time_s`, `position_mm` (k,) with nodes between samples where they matter;
-    `std_mm` (k,): what is left of the noise; `noise_mm`: what it was, of means. `stretch` (k,): nodes of one number
+    `std_mm` (k,): what is left of the noise; `noise`: what it was. `stretch` (k,): nodes of one number
     share most of the error that is left. `rest` (k,): number of the rest, 0: in motion."""
 
     time_s: Array
     position_mm: Array
     std_mm: Array
-    noise_mm: float
+    noise: PositionNoise
     stretch: NDArray[np.intp]
     rest: NDArray[np.intp]
     planned: tuple[tuple[float, float, Trapezoid], ...] = ()
@@ -298,25 +298,25 @@ def settled(time_s: Array, position_mm: Array) -> Array:
 @dataclass(frozen=True)
 class _Settled:
     """Smoothed positions (n,) with each rest at its level, their standard deviations (n,), the number of the rest (n,),
-    0: in motion; what is left of the noise of all, and that noise, of means, mm."""
+    0: in motion; what is left of the noise of all, mm, and that noise."""
 
     clean_mm: Array
     std_mm: Array
     hold: NDArray[np.intp]
     left_mm: float
-    noise_mm: float
+    noise: PositionNoise
 
     @property
     def smoother(self) -> bool:
         """Whether there was noise that smoothing took away."""
-        return 0.0 < self.left_mm < self.noise_mm
+        return 0.0 < self.left_mm < self.noise.of_means_mm
 
 
 def _settled(time_s: Array, position_mm: Array) -> _Settled:
     noise = position_noise(position_mm)
     clean, std = smoothed(time_s, position_mm, noise)
     left = float(np.median(std)) if len(std) else 0.0
-    found = _Settled(clean, std, np.zeros(len(clean), dtype=np.intp), left, noise.of_means_mm)
+    found = _Settled(clean, std, np.zeros(len(clean), dtype=np.intp), left, noise)
     if not found.smoother:
         return found
     clean, std, hold = _rested(position_mm, clean, std, noise, left)
@@ -330,13 +330,13 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
     lag feel accelerations and corners that no smoothing keeps.
     """
     begun = _settled(time_s, position_mm)
-    clean, std, hold, left, noise = begun.clean_mm, begun.std_mm, begun.hold, begun.left_mm, begun.noise_mm
+    clean, std, hold, left, noise = begun.clean_mm, begun.std_mm, begun.hold, begun.left_mm, begun.noise.of_means_mm
     planned: Moves = {}
     stretch = -1 - np.arange(len(clean)) // TOGETHER
     if begun.smoother:
         step, coarse = resolution(position_mm), _coarse(position_mm)
         stretch = np.where(hold > 0, hold, stretch)
-        planned = planned_moves(time_s, position_mm, clean, noise, left, hold > 0)
+        planned = planned_moves(time_s, position_mm, clean, noise, left, hold > 0, begun.noise.each_mm)
         worse = float(np.sqrt(max(missed(planned, time_s, position_mm, noise)[0], 1.0)))
         for (first, last), move in planned.items():
             inside = slice(first, last + 1)
@@ -356,4 +356,4 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
     before = np.clip(np.searchsorted(time_s, time, side="right") - 1, 0, len(clean) - 1)
     moves = tuple((float(time_s[a]), float(time_s[b]), move) for (a, b), move in sorted(planned.items()))
     std = np.asarray(np.interp(time, time_s, std))
-    return Felt(time, position, std, noise, stretch[before], hold[before], moves)
+    return Felt(time, position, std, begun.noise, stretch[before], hold[before], moves)

@@ -173,10 +173,10 @@ def fitted_moves(
 
 def smoothed_shape(
     t: Array, x: Array, moving: NDArray[np.bool_], groups: list[Group], reach: float, noise: float, fitted: Array,
-    resting: NDArray[np.bool_] | None = None, back: float = 0.0,
+    resting: NDArray[np.bool_] | None = None, back: float = 0.0, each: float | None = None,
 ) -> tuple[Smoothing, float] | None:  # fmt: skip
     """What smooths the moves, and their acceleration, mm/s², where they are trapezoids but for that; None where they
-    are as they are, or something else."""
+    are as they are, or something else. `noise`: of means of samples; `each`: of a sample, where that is another."""
     every = _asked(t, x, moving, groups, noise, fitted, SHOWING, resting, back)
     if every is None:
         return None
@@ -191,10 +191,9 @@ def smoothed_shape(
     def told(acceleration: float, smoothing: Smoothing) -> tuple[float, float]:
         """(share of the moves that are such profiles but for noise; standard deviations by which all of them together
         leave more than that: one alone hides much)."""
-        n = asked.moves.count
-        chi2 = _fitted(asked.moves, acceleration, smoothing)[2] / noise**2
-        beyond = float(np.sum(chi2 - NOISIER * n)) / float(np.sqrt(2.0 * np.sum(n)))
-        return float(np.mean(chi2 <= 1.2 * n + AGREED * np.sqrt(2.0 * n))), beyond
+        squares, n = _fitted(asked.moves, acceleration, smoothing)[2], asked.moves.count.astype(np.float64)
+        beyond = float(strays(float(np.sum(squares)), float(np.sum(n)), noise, each, NOISIER))
+        return float(np.mean(strays(squares, n, noise, each) <= AGREED)), beyond
 
     plain = asked.acceleration(reach)
     as_they_are, off = told(plain, PLAIN)
@@ -227,6 +226,15 @@ def _searched(cost: Callable[[Array], float], start: Array) -> tuple[Array, floa
 
 def _smoothing(numbers: Array) -> Smoothing:
     return Smoothing(abs(float(numbers[1])), abs(float(numbers[2])))
+
+
+def strays(
+    squares: Array | float, count: Array | float, noise: float, each: float | None, allowed: float = 1.2
+) -> Array:
+    """Standard deviations of χ² by which sums of squares of `count` samples are more than `allowed` times the noise of
+    `each` of them; `noise` is that of means: where it is more, some samples say the same."""
+    sigma = noise if each is None else each
+    return np.asarray((squares / sigma**2 - allowed * count) / (np.sqrt(2.0 * count) * noise / sigma))
 
 
 def from_rest(moving: NDArray[np.bool_], x: Array, group: Group, back: float = 0.0) -> bool:

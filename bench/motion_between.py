@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.fitted_moves import AGREED, ALL, Moves, fitted_moves, smoothed_shape
+from bench.fitted_moves import AGREED, ALL, Moves, fitted_moves, smoothed_shape, strays
 from bench.profiles import Trapezoid
 
 Array = NDArray[np.float64]
@@ -77,8 +77,10 @@ def planned_moves(
     noise_mm: float,
     left_mm: float,
     resting: NDArray[np.bool_] | None = None,
+    each_mm: float | None = None,
 ) -> Moves:
-    """Moves whose noisy positions (n,) are those of a trapezoid and nothing else, within the noise of the samples.
+    """Moves whose noisy positions (n,) are those of a trapezoid and nothing else, within the noise of the samples:
+    `noise_mm` of means over many, `each_mm` of one, where that is another.
 
     `clean_mm` (n,): the same positions smoothed, with noise `left_mm`: they tell where moves begin and end. `resting`
     (n,): where they are means over a long rest; a move begins and ends at such a level where one is near.
@@ -99,12 +101,12 @@ def planned_moves(
                 if not asked:
                     asked = True
                     shape = smoothed_shape(
-                        time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, resting, back
+                        time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, resting, back, each_mm
                     )
                 found = fitted_moves(
                     time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, ALL, resting, back, shape
                 )
-                told = _told(found, time_s, position_mm, noise_mm)
+                told = _told(found, time_s, position_mm, noise_mm, each_mm)
                 out |= {k: v for k, v in told.items() if not any(k[0] < o[1] and o[0] < k[1] for o in out)}
     power, parts = missed(out, time_s, position_mm, noise_mm)
     return _apart(out) if power <= LOOSE + AGREED * np.sqrt(2.0 / parts) else {}
@@ -147,7 +149,7 @@ def _chained(position_mm: Array, pieces: list[tuple[int, int]], gap: int) -> lis
     return out
 
 
-def _told(found: Moves, time_s: Array, position_mm: Array, noise_mm: float) -> Moves:
+def _told(found: Moves, time_s: Array, position_mm: Array, noise_mm: float, each_mm: float | None) -> Moves:
     """Those that the noisy positions agree with, with the slow beginnings and ends that hide in the noise. What goes no
     farther than noise does is none: a coarse scale hops to and fro, and a mass would feel that as blows."""
     out = {}
@@ -157,9 +159,8 @@ def _told(found: Moves, time_s: Array, position_mm: Array, noise_mm: float) -> M
         begin_s, end_s = move.span_s()
         a = min(first, max(int(np.searchsorted(time_s, begin_s)) - 1, 0))
         b = max(last, min(int(np.searchsorted(time_s, end_s)) + 1, len(time_s) - 1))
-        off = (position_mm[a : b + 1] - move.position(time_s[a : b + 1])) / noise_mm
-        n = len(off)
-        if n >= LEAST and float(np.sum(off**2)) <= 1.2 * n + AGREED * np.sqrt(2.0 * n):
+        off = position_mm[a : b + 1] - move.position(time_s[a : b + 1])
+        if len(off) >= LEAST and strays(float(off @ off), len(off), noise_mm, each_mm) <= AGREED:
             out[a, b] = move
     return out
 

@@ -78,7 +78,8 @@ def _memory(position_mm: Array, noise_mm: float) -> tuple[float, float, float] |
         return None
     fits = [(kept, *amounts(np.stack([np.ones(len(LAGS)), 1.0 - kept**LAGS], axis=1), grown)) for kept in KEPT]
     kept, (white, coloured), left = min(fits, key=lambda fit: float(fit[2]))
-    if left > AS_IT_FADES * float(np.linalg.norm(grown - grown.mean())):
+    by_chance = float(np.sqrt(2.0 * (1.0 + kept**2) / (1.0 - kept**2) / count))  # few samples scatter about any curve
+    if left > (AS_IT_FADES + by_chance) * float(np.linalg.norm(grown - grown.mean())):
         return None
     return float(white), float(coloured), float(kept)
 

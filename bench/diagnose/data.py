@@ -336,7 +336,7 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         said_of_noise=loud.said,
         hum=line,
         hum_N=hum,
-        position_noise_mm=max(motion.noise_mm, 1.05 * resolution(m.position_mm)),
+        position_noise_mm=max(motion.noise.each_mm, 1.05 * resolution(m.position_mm)),
         sample_s=sample_s,
         doubt_mm=m.surface_std_mm,
         zero_N=m.zero_std_N,

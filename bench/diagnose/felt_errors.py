@@ -101,7 +101,7 @@ def redrawn(prepared: Prepared, rng: np.random.Generator) -> Array:
 def _read_again(prepared: Prepared, position_mm: Array, rng: np.random.Generator) -> Array:
     """Positions (p,) as they might have been read as well, wherever the scale's zero is."""
     step_mm = prepared.position_step_mm
-    noise_mm = np.sqrt(max(prepared.motion.noise_mm**2 - step_mm**2 / 12.0, 0.0))
+    noise_mm = np.sqrt(max(prepared.motion.noise.of_means_mm**2 - step_mm**2 / 12.0, 0.0))
     read = position_mm + noise_mm * rng.standard_normal(len(position_mm))
     if step_mm == 0.0:
         return np.asarray(read)
