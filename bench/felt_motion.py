@@ -132,6 +132,8 @@ class Felt:
     noise: PositionNoise
     stretch: NDArray[np.intp]
     rest: NDArray[np.intp]
+    doubt_mm: Array
+    """Of a planned move, how far another profile that the samples exclude as little goes beside it (k,)."""
     planned: tuple[tuple[float, float, Trapezoid], ...] = ()
     """(from when, s; to when, s; how) the motion is a planned move."""
 
@@ -332,11 +334,12 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
     begun = _settled(time_s, position_mm)
     clean, std, hold, left, noise = begun.clean_mm, begun.std_mm, begun.hold, begun.left_mm, begun.noise.of_means_mm
     planned: Moves = {}
+    doubt = np.zeros(len(clean))
     stretch = -1 - np.arange(len(clean)) // TOGETHER
     if begun.smoother:
         step, coarse = resolution(position_mm), _coarse(position_mm)
         stretch = np.where(hold > 0, hold, stretch)
-        planned = planned_moves(time_s, position_mm, clean, noise, left, hold > 0, begun.noise.each_mm)
+        planned, others = planned_moves(time_s, position_mm, clean, noise, left, hold > 0, begun.noise.each_mm)
         worse = float(np.sqrt(max(missed(planned, time_s, position_mm, noise)[0], 1.0)))
         for (first, last), move in planned.items():
             inside = slice(first, last + 1)
@@ -345,6 +348,8 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
                 level = move.position(time_s[rest])
                 if _by_chance((position_mm[rest] - level) / noise):
                     clean[rest] = level
+            if (other := others.get((first, last))) is not None:
+                doubt[inside] = np.abs(other.position(time_s[inside]) - clean[inside])
             at_ends = max(float(std[first]), float(std[last]), 0.7 * coarse)
             std[inside] = max(2.0 * worse * noise / np.sqrt(last - first + 1), at_ends)
             stretch[inside] = 1 + len(clean) + first
@@ -355,5 +360,5 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
     time, position = motion_between(time_s, clean, noise_mm=left, planned=planned)
     before = np.clip(np.searchsorted(time_s, time, side="right") - 1, 0, len(clean) - 1)
     moves = tuple((float(time_s[a]), float(time_s[b]), move) for (a, b), move in sorted(planned.items()))
-    std = np.asarray(np.interp(time, time_s, std))
-    return Felt(time, position, std, begun.noise, stretch[before], hold[before], moves)
+    std, doubt = np.interp(time, time_s, std), np.interp(time, time_s, doubt)
+    return Felt(time, position, std, begun.noise, stretch[before], hold[before], doubt, moves)

@@ -17,13 +17,16 @@ Group = tuple[int, int]
 
 Moves = dict[Group, Trapezoid]
 
+Shape = tuple[Smoothing, float]
+"""What smooths all moves, and their acceleration, mm/s²."""
+
 INSIDE, ALL = 16, 200  # samples of a move that are looked at; where they are noisy
 SCAN = np.geomspace(100.0, 1e6, 25)  # of accelerations, in reaches/s²
 GENTLE = 0.01  # what a doubled acceleration costs, in squares of the slack and a move
 SLACK = 1e-3  # of the way: what a trapezoid may miss a sample by
 NEAR = 30  # samples between a move and a rest, whose first and last ones may be told late
+NOISIER = 1.2  # times the noise's square as the rests tell it, that a move may leave
 AGREED = 5.0  # standard deviations of χ² within which a move is a profile
-NOISIER = 1.05  # times the noise's square as the rests tell it
 MOSTLY = 0.8  # of the moves that tell: where so many are trapezoids nothing smooths them
 TELLING, SHOWING = 6, 48  # samples of a move that tell how it begins and ends, at the least; and as many as it takes
 APART = 10  # samples of rest between two moves, one of which would else be in the other
@@ -31,8 +34,7 @@ BEGUN = 1.02  # times the speed that is seen, where a search begins
 FASTEST = 12  # moves: slow ones hardly show how they begin
 SMOOTHED_S = (0.3e-3, 0.7e-3, 1.5e-3, 3e-3, 6e-3, 12e-3)  # standard deviations of smoothing that are tried first
 FASTER, STARTED = (1.0, 1.5, 3.0), 2  # times the acceleration of plain trapezoids; the best of these that are begun at
-FEWER = 0.95  # of the cost without, that smoothing must leave at the most
-SOME = 0.15  # of the moves, that it must explain
+TAKEN, SURELY = 12.0, 30.0  # χ² that smoothing must take; less leaves some doubt
 
 
 @dataclass
@@ -121,7 +123,7 @@ def fitted_moves(
     most: int = INSIDE,
     resting: NDArray[np.bool_] | None = None,
     back: float = 0.0,
-    shape: tuple[Smoothing, float] | None = None,
+    shape: Shape | None = None,
 ) -> Moves:
     """The groups that are trapezoids, within what the samples tell; `fitted`: samples to fit instead of x, `most` of a
     move. `noise`: of all of them, or of each of the groups, which begin and end at rest then. `resting`: where x is the
@@ -174,46 +176,46 @@ def fitted_moves(
 def smoothed_shape(
     t: Array, x: Array, moving: NDArray[np.bool_], groups: list[Group], reach: float, noise: float, fitted: Array,
     resting: NDArray[np.bool_] | None = None, back: float = 0.0, each: float | None = None,
-) -> tuple[Smoothing, float] | None:  # fmt: skip
-    """What smooths the moves, and their acceleration, mm/s², where they are trapezoids but for that; None where they
-    are as they are, or something else. `noise`: of means of samples; `each`: of a sample, where that is another."""
+) -> tuple[Shape | None, Shape | None]:  # fmt: skip
+    """(what smooths the moves, where they are trapezoids but for that: None where they are as they are, or something
+    else; what these samples exclude as little). `noise`: of means of samples; `each`: of one, where that is another."""
     every = _asked(t, x, moving, groups, noise, fitted, SHOWING, resting, back)
     if every is None:
-        return None
+        return None, None
     # where a move turns round at once, the end of the one before is in it
     firsts, lasts = np.array(every.groups).T
     apart = np.minimum(np.append(firsts[1:] - lasts[:-1], NEAR), np.append(NEAR, firsts[1:] - lasts[:-1])) >= APART
     telling = np.flatnonzero((every.moves.count >= TELLING) & apart)
     if not len(telling):
-        return None
+        return None, None
     asked = every.only(telling[np.argsort(-every.moves.speed[telling], kind="stable")[:FASTEST]])
 
-    def told(acceleration: float, smoothing: Smoothing) -> tuple[float, float]:
-        """(share of the moves that are such profiles but for noise; standard deviations by which all of them together
-        leave more than that: one alone hides much)."""
-        squares, n = _fitted(asked.moves, acceleration, smoothing)[2], asked.moves.count.astype(np.float64)
-        beyond = float(strays(float(np.sum(squares)), float(np.sum(n)), noise, each, NOISIER))
-        return float(np.mean(strays(squares, n, noise, each) <= AGREED)), beyond
-
-    plain = asked.acceleration(reach)
-    as_they_are, off = told(plain, PLAIN)
-    if as_they_are >= MOSTLY and off <= AGREED:
-        return None
+    n, plain = asked.moves.count.astype(np.float64), asked.acceleration(reach)
+    lags = [(np.sqrt(12.0) * std, 0.0) for std in SMOOTHED_S] + [(0.0, std / np.sqrt(2.0)) for std in SMOOTHED_S]
+    begun = [np.array([np.log(factor * plain), *lag]) for lag in lags for factor in FASTER]
 
     def cost(numbers: Array) -> float:
         return asked.cost(float(np.exp(min(numbers[0], 25.0))), _smoothing(numbers))
 
-    begun = [
-        np.array([np.log(factor * plain), *width_and_lag])
-        for std in SMOOTHED_S
-        for width_and_lag in ((np.sqrt(12.0) * std, 0.0), (0.0, std / np.sqrt(2.0)))
-        for factor in FASTER
-    ]
-    found = min((_searched(cost, start) for start in sorted(begun, key=cost)[:STARTED]), key=lambda r: r[1])
-    acceleration, smoothing = float(np.exp(found[0][0])), _smoothing(found[0])
-    fewer = found[1] < cost(np.array([np.log(plain), 0.0, 0.0])) * FEWER
-    share, beyond = told(acceleration, smoothing)
-    return (smoothing, acceleration) if fewer and (share > as_they_are + SOME or beyond < off - AGREED) else None
+    def left(numbers: Array) -> Array:
+        return _fitted(asked.moves, float(np.exp(min(numbers[0], 25.0))), _smoothing(numbers))[2]
+
+    as_they_are = left(np.array([np.log(plain), 0.0, 0.0]))
+
+    sigma, memory = (noise, 1.0) if each is None else (each, (noise / each) ** 2)
+    agreed = strays(as_they_are, n, noise, each) <= AGREED
+    enough = np.sum(n[agreed]) - 2.0 * np.sqrt(2.0 * np.sum(n[agreed]) * memory) + memory * TAKEN
+    if np.mean(agreed) >= MOSTLY and float(np.sum(as_they_are[agreed])) < enough * sigma**2:
+        return None, None  # there is nothing to take
+    found = min((_searched(cost, start) for start in sorted(begun, key=cost)[:STARTED]), key=lambda r: r[1])[0]
+    smoothed = left(found)
+    of_all = np.sqrt(smoothed / n) <= asked.allowed  # others are no such profiles at all
+    each_left = max(float(np.sum(smoothed[of_all])) / max(float(np.sum(n[of_all])), 1.0), sigma**2)
+    taken = float(np.sum((as_they_are - smoothed)[of_all])) / each_left / memory
+    shape, bare = (_smoothing(found), float(np.exp(found[0]))), (PLAIN, plain)
+    if taken < TAKEN:
+        return None, shape if taken > 0.0 else None
+    return shape, bare if taken < SURELY else None
 
 
 def _searched(cost: Callable[[Array], float], start: Array) -> tuple[Array, float]:
@@ -228,13 +230,11 @@ def _smoothing(numbers: Array) -> Smoothing:
     return Smoothing(abs(float(numbers[1])), abs(float(numbers[2])))
 
 
-def strays(
-    squares: Array | float, count: Array | float, noise: float, each: float | None, allowed: float = 1.2
-) -> Array:
-    """Standard deviations of χ² by which sums of squares of `count` samples are more than `allowed` times the noise of
+def strays(squares: Array | float, count: Array | float, noise: float, each: float | None) -> Array:
+    """Standard deviations of χ² by which sums of squares of `count` samples are more than `NOISIER` times the noise of
     `each` of them; `noise` is that of means: where it is more, some samples say the same."""
     sigma = noise if each is None else each
-    return np.asarray((squares / sigma**2 - allowed * count) / (np.sqrt(2.0 * count) * noise / sigma))
+    return np.asarray((squares / sigma**2 - NOISIER * count) / (np.sqrt(2.0 * count) * noise / sigma))
 
 
 def from_rest(moving: NDArray[np.bool_], x: Array, group: Group, back: float = 0.0) -> bool:

@@ -78,18 +78,20 @@ def planned_moves(
     left_mm: float,
     resting: NDArray[np.bool_] | None = None,
     each_mm: float | None = None,
-) -> Moves:
+) -> tuple[Moves, Moves]:
     """Moves whose noisy positions (n,) are those of a trapezoid and nothing else, within the noise of the samples:
-    `noise_mm` of means over many, `each_mm` of one, where that is another.
+    `noise_mm` of means over many, `each_mm` of one, where that is another. And those of them that may be of another
+    shape as well, in that.
 
     `clean_mm` (n,): the same positions smoothed, with noise `left_mm`: they tell where moves begin and end. `resting`
     (n,): where they are means over a long rest; a move begins and ends at such a level where one is near.
     """
     reach = float(np.ptp(clean_mm))
     if len(time_s) < 5 or not reach > 0:
-        return {}
+        return {}, {}
     out: Moves = {}
-    asked, shape = False, None
+    asked, shape, other = False, None, None
+    back = 4.0 * noise_mm
     for quiet_mm in (left_mm, noise_mm):  # what is left beside a move may hide that it begins at rest
         moving = _carried_on(_moving(clean_mm, reach, quiet_mm)[0], clean_mm)
         pieces = [_onward(clean_mm, *group) for group in _grouped(moving, moving)]
@@ -97,10 +99,9 @@ def planned_moves(
             groups = [(a, b) for a, b in _chained(clean_mm, pieces, gap) if b - a >= LEAST]
             groups = [g for g in groups if not any(g[0] < o[1] and o[0] < g[1] for o in out)]
             if groups:
-                back = 4.0 * noise_mm
                 if not asked:
                     asked = True
-                    shape = smoothed_shape(
+                    shape, other = smoothed_shape(
                         time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, resting, back, each_mm
                     )
                 found = fitted_moves(
@@ -109,7 +110,14 @@ def planned_moves(
                 told = _told(found, time_s, position_mm, noise_mm, each_mm)
                 out |= {k: v for k, v in told.items() if not any(k[0] < o[1] and o[0] < k[1] for o in out)}
     power, parts = missed(out, time_s, position_mm, noise_mm)
-    return _apart(out) if power <= LOOSE + AGREED * np.sqrt(2.0 / parts) else {}
+    if not out or power > LOOSE + AGREED * np.sqrt(2.0 / parts):
+        return {}, {}
+    out = _apart(out)
+    if other is None:
+        return out, {}
+    return out, fitted_moves(
+        time_s, clean_mm, moving, list(out), reach, noise_mm, position_mm, ALL, resting, back, other
+    )
 
 
 def missed(found: Moves, time_s: Array, position_mm: Array, noise_mm: float) -> tuple[float, int]:

@@ -20,6 +20,7 @@ AS_LOUD = 2.0  # times the growth of a usual hold: more is motion
 GROWS, SURE = 1.1, 5.0  # growth from a lag of one sample to longer ones that is a memory; standard deviations
 AS_IT_FADES = 0.2  # of how the growths differ, that a memory which fades leaves at the most: more is motion
 KEPT = np.array([0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95])  # of a value, one sample on
+AVERAGED = np.array([2, 3, 4, 5, 6, 8, 10, 12, 16])  # samples that a moving mean is of
 
 
 def resolution(values: Array) -> float:
@@ -62,26 +63,28 @@ def position_noise(position_mm: Array) -> PositionNoise:
     if seen is None:
         return PositionNoise(float(short), float(short))
     # holds were cut where louder noise than was known of ran out of them
-    white, coloured, kept = _memory(position_mm, float(np.sqrt(seen[0] + seen[1]))) or seen
-    return PositionNoise(
-        float(np.sqrt(white + coloured)), float(np.sqrt(white + coloured * (1.0 + kept) / (1.0 - kept)))
-    )
+    white, coloured, alike = _memory(position_mm, float(np.sqrt(seen[0] + seen[1]))) or seen
+    return PositionNoise(float(np.sqrt(white + coloured)), float(np.sqrt(white + alike * coloured)))
 
 
 def _memory(position_mm: Array, noise_mm: float) -> tuple[float, float, float] | None:
-    """(σ_w², mm²; σ_c², mm²; ρ) of holds with some noise; None: there is no memory."""
+    """(σ_w², mm²; σ_c², mm²; samples of the latter that say the same) of holds with some noise; None: no memory."""
     grown, count = _growth(position_mm, noise_mm)
     if count == 0 or grown[0] == 0.0 or not np.isfinite(grown).all():  # numbers of no bench are refused later
         return None
     longer = float(np.mean(grown[len(LAGS) // 2 :]))
     if longer < (GROWS + SURE * np.sqrt(len(LAGS) / (4.0 * count))) * grown[0]:
         return None
-    fits = [(kept, *amounts(np.stack([np.ones(len(LAGS)), 1.0 - kept**LAGS], axis=1), grown)) for kept in KEPT]
-    kept, (white, coloured), left = min(fits, key=lambda fit: float(fit[2]))
-    by_chance = float(np.sqrt(2.0 * (1.0 + kept**2) / (1.0 - kept**2) / count))  # few samples scatter about any curve
+    fading = [(1.0 - kept**LAGS, (1.0 + kept) / (1.0 - kept)) for kept in KEPT]
+    averages = [(np.minimum(LAGS / many, 1.0), float(many)) for many in AVERAGED]
+    fits = [
+        (alike, *amounts(np.stack([np.ones(len(LAGS)), growth], axis=1), grown)) for growth, alike in fading + averages
+    ]
+    alike, (white, coloured), left = min(fits, key=lambda fit: float(fit[2]))
+    by_chance = float(np.sqrt(alike / count))  # few samples scatter about any curve
     if left > (AS_IT_FADES + by_chance) * float(np.linalg.norm(grown - grown.mean())):
         return None
-    return float(white), float(coloured), float(kept)
+    return float(white), float(coloured), float(alike)
 
 
 def _growth(position_mm: Array, noise_mm: float) -> tuple[Array, int]:

@@ -312,7 +312,8 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
     # a hold or a planned move is off as a whole; elsewhere windows of neighbours share what they share
     whole = np.where(stretch[where] > 0, 1.0, np.sqrt(0.5))
     shared[where] = whole * through
-    sigma[where] = np.hypot(noise_N, np.sqrt(1.0 - whole**2) * through)
+    doubt = stiffness * np.interp(m.force_time_s, motion.time_s, motion.doubt_mm)
+    sigma[where] = np.hypot(noise_N, np.hypot(np.sqrt(1.0 - whole**2) * through, doubt))
     stretch = np.unique(stretch, return_inverse=True)[1]
     weight[where] = counted
     force[where], hum[where] = m.force_N, np.where(counted, taken_N, 0.0)

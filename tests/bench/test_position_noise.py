@@ -38,6 +38,27 @@ def test_noise_with_a_memory_is_as_loud_as_its_means(kept: float) -> None:
     assert np.all(np.abs(np.log(np.array(told) / wanted)) < 0.4)
 
 
+@pytest.mark.parametrize("many", [2, 3, 5, 8])
+def test_moving_means_are_as_loud_as_what_they_are_of(many: int) -> None:
+    """An encoder that reports the mean of its last readings: in nine of ten draws within an eighth."""
+    near = 0
+    for seed in range(10):
+        white = np.sqrt(many) * NOISE_MM * np.random.default_rng([seed, many]).standard_normal(8000 + many - 1)
+        noise = position_noise(staircase(8000) + np.convolve(white, np.ones(many) / many, "valid"))
+        each, of_means = noise.each_mm / NOISE_MM, noise.of_means_mm / (np.sqrt(many) * NOISE_MM)
+        near += abs(each - 1.0) < 0.125 and abs(of_means - 1.0) < 0.125
+    assert near >= 9
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_few_short_holds_tell_of_a_memory(seed: int) -> None:
+    """Ten holds of 125 samples amid moves as long: within a third, and most of the draws far nearer."""
+    k = np.arange(2500)
+    x = 0.3 * (k // 250 + np.minimum(k % 250 / 125.0, 1.0))
+    noise = position_noise(x + noise_of(0.8, 2500, np.random.default_rng(seed)))
+    assert noise.of_means_mm == pytest.approx(3.0 * NOISE_MM, rel=1.0 / 3.0)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_servo_that_swings_is_no_noise(seed: int) -> None:
     """It is motion, which the pad feels."""

@@ -107,7 +107,7 @@ def test_moves_between_noisy_rests_are_found() -> None:
         read = position_noise(m.position_mm)
         clean, std = smoothed(m.position_time_s, m.position_mm, read)
         noise, left = read.of_means_mm, float(np.median(std))
-        found = planned_moves(m.position_time_s, m.position_mm, clean, noise, left)
+        found, _ = planned_moves(m.position_time_s, m.position_mm, clean, noise, left)
         at = c.truth.motion.breaks_s
         speed = np.abs(c.truth.motion.velocity(0.5 * (at[1:] + at[:-1])))
         fast = at[:-1][(speed > 5.0)]
