@@ -22,7 +22,7 @@ from . import ripple
 from .data import Data
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, errors, extended, force_at, jacobian
-from .way import on_the_way
+from .way import on_the_way, shown_on_the_way
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ MOST_STARTS = 96
 LOWEST_RINGING_HZ, FREQUENCIES = 4.0, 32
 NEARBY, ABOUT = 7, 2.0  # frequencies about one that was found, and up to how many times it, either way
 SHORTEST, SHORTEST_MOVING = 0.12, 0.03  # of the longest period
-MOSTLY = 0.5  # of the force samples, that are on the way
+MOSTLY, NEARLY_ALL = 0.5, 0.8  # of the force samples, that are on the way; of the travel, that they show finely
 MANY = 20
 LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
@@ -69,8 +69,8 @@ class Reach:
     """Whether depths are held, or passed again: what depends on the position alone differs there from a law, which
     relaxes. In one pass over the depth it is told only by many periods."""
     moving: bool = False
-    """Whether there is no pad, or most forces were felt on the way: then the moves show a ripple itself, all along the
-    travel."""
+    """Whether there is no pad, or most forces were felt on the way, or some nearly all along it: then the moves show a
+    ripple itself."""
 
     @classmethod
     def of(cls, data: Data, structure: Structure, sample_s: float, rich: bool = True) -> Reach:
@@ -85,7 +85,7 @@ class Reach:
             force_N=force_N,
             changes_N=max(float(np.sum(np.abs(np.diff(into_mm)))) * force_N / depth_mm, force_N),
             rich=rich,
-            moving=structure.in_air or on_the_way(data) > MOSTLY,
+            moving=structure.in_air or on_the_way(data) > MOSTLY or shown_on_the_way(data) > NEARLY_ALL,
         )
 
 

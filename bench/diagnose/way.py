@@ -20,6 +20,7 @@ LEVELS, PASSES = 4, 4  # depths held, or passes over the depth, that make data r
 AGAIN = 2  # times that a depth is held again, after another one, which do as well
 LEAST = 0.05  # of the greatest depth: less is no way, nor another level
 MOVES = 0.2  # of the mean speed over all of the run
+PARTS = 60  # of the travel: three and more for each wave of the shortest ripple that is sought where they are shown
 TOLD_ONCE = 0.5  # how sure a name can be of what acts with the motion, where data are not rich
 
 
@@ -50,6 +51,14 @@ def on_the_way(data: Data) -> float:
     mean_speed = float(way_mm.sum()) / max(float(data.time_s[-1] - data.time_s[0]), 1e-300)
     moves = way_mm > MOVES * mean_speed * apart_s
     return float(data.weight[1:][moves].sum() / max(data.weight.sum(), 1e-300))
+
+
+def shown_on_the_way(data: Data) -> float:
+    """Share of the travel that samples amid motion show as finely as its `PARTS`."""
+    way_mm, part_mm = np.abs(np.diff(data.position_mm)), float(np.ptp(data.position_mm)) / PARTS
+    fine = (way_mm > 0.0) & (way_mm <= part_mm) & (data.weight[1:] > 0)
+    parts = np.minimum((data.position_mm[1:][fine] - data.position_mm.min()) // max(part_mm, 1e-300), PARTS - 1)
+    return np.unique(parts).size / PARTS
 
 
 def most_sure(effect: Effect, rich: bool) -> float:

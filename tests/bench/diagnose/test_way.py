@@ -9,7 +9,7 @@ import pytest
 
 from bench.diagnose import Diagnosis, diagnose
 from bench.diagnose.data import Data
-from bench.diagnose.way import TOLD_ONCE, is_rich, on_the_way
+from bench.diagnose.way import TOLD_ONCE, is_rich, on_the_way, shown_on_the_way
 from sim.effects import all_effects
 from sim.model import Model
 from tests.bench.diagnose.small import case, diagnosed, measurement
@@ -56,6 +56,35 @@ def test_the_way_above_the_surface_is_one_of_a_bonded_pad():
 @pytest.mark.parametrize(("hold_s", "share"), [(0.0, 1.0), (1.0, 0.5), (9.0, 0.1)])
 def test_the_share_of_the_forces_that_are_felt_on_the_way(hold_s, share):
     assert on_the_way(data([1.0, 2.0, 1.0, 0.0], hold_s)) == pytest.approx(share, abs=0.01)
+
+
+def test_how_much_of_the_travel_some_forces_show_on_the_way():
+    """Moves of 1 mm/s and 100 samples a second show all of 2 mm finely, however long the holds are; ten times fewer
+    samples show a few places."""
+    slow = data([1.0, 2.0, 0.0], 9.0)
+    assert shown_on_the_way(slow) == 1.0
+    every = slice(None, None, 10)
+    few = replace(slow, time_s=slow.time_s[every], position_mm=slow.position_mm[every], weight=slow.weight[every])
+    assert shown_on_the_way(few) < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in range(2, 7))])
+def test_a_short_ripple_is_found_though_most_forces_are_felt_at_rest(seed):
+    """One depth, at speeds from fast to slow, with long rests: the slow moves tell the ripple and its harmonics."""
+    rng, path = np.random.default_rng(seed), Path(-0.3, 3000.0).hold(1.0)
+    for speed in (20.0, 6.0, 2.0, 0.7):
+        path = path.to(1.2, speed).hold(5.0).to(-0.1, speed).hold(3.0)
+    force_N, period_mm = 0.03, float(rng.uniform(0.11, 0.17))
+    c = draw_case(seed, (), motion=path.hold(1.0).motion(), rate_hz=150.0, noise_kind="white", noise_N=0.003)
+    m = measurement(c)
+    turn = 2 * np.pi * np.interp(m.force_time_s, c.time_s, c.truth.reported_mm) / period_mm
+    wave_N = force_N * (np.sin(turn + seed) + 0.35 * np.sin(2 * turn) + 0.2 * np.sin(3 * turn + 1.0))
+    d = diagnose(replace(m, force_N=m.force_N + wave_N), Model.from_dict(c.believed))
+    found = d.causes[0].parameters
+    assert d.verdict == "explained" and [cause.id for cause in d.causes] == ["cogging"]
+    assert found["period"].value == pytest.approx(period_mm, rel=0.01)
+    assert found["amplitude"].value == pytest.approx(force_N, rel=0.05)
 
 
 @pytest.mark.slow
