@@ -85,7 +85,7 @@ class Reach:
             force_N=force_N,
             changes_N=max(float(np.sum(np.abs(np.diff(into_mm)))) * force_N / depth_mm, force_N),
             rich=rich,
-            moving=structure.in_air or on_the_way(data) > MOSTLY or shown_on_the_way(data) > NEARLY_ALL,
+            moving=structure.in_air or on_the_way(data) > MOSTLY or (rich and shown_on_the_way(data) > NEARLY_ALL),
         )
 
 
