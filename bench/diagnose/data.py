@@ -309,8 +309,8 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
     sigma, weight, force = np.full(len(grid), sigma_force), np.zeros(len(grid)), np.zeros(len(grid))
     shared, hum = np.zeros(len(grid)), np.zeros(len(grid))
     stretch = motion.stretch[np.clip(np.searchsorted(motion.time_s, grid, side="right") - 1, 0, None)]
-    # a hold or a planned move is off as a whole; elsewhere windows of neighbours share what they share
-    whole = np.where(stretch[where] > 0, 1.0, np.sqrt(0.5))
+    # a rest is off as a whole; windows of neighbours, and moves that may begin late and be too fast, share a part
+    whole = np.where(motion.rest_at(grid)[where] > 0, 1.0, np.sqrt(0.5))
     shared[where] = whole * through
     doubt = stiffness * np.interp(m.force_time_s, motion.time_s, motion.doubt_mm)
     sigma[where] = np.hypot(noise_N, np.hypot(np.sqrt(1.0 - whole**2) * through, doubt))
