@@ -29,6 +29,7 @@ BEND = 1e-4  # of the reach: a bend that a line between nodes may leave out
 WIDEST = 64  # nodes an interval at the most
 LEAST = 3  # samples of a move that can show it to be a trapezoid
 PARTS, SHORTEST = 6, 4  # of a move, whose means show another profile; samples of one
+ENDS = 6  # samples at either end of a move, which are off together where its level is not that of the rest beside it
 LOOSE = 2.5  # times the power of the noise: another profile that is as near as a smoothed motion would be
 FARTHER = 8.0  # times the noise, that a planned move goes at the least
 PAUSE = 2  # intervals that are no rest where the motion hardly slows down
@@ -168,7 +169,9 @@ def _told(found: Moves, time_s: Array, position_mm: Array, noise_mm: float, each
         a = min(first, max(int(np.searchsorted(time_s, begin_s)) - 1, 0))
         b = max(last, min(int(np.searchsorted(time_s, end_s)) + 1, len(time_s) - 1))
         off = position_mm[a : b + 1] - move.position(time_s[a : b + 1])
-        if len(off) >= LEAST and strays(float(off @ off), len(off), noise_mm, each_mm) <= AGREED:
+        at_ends = max(abs(float(end.sum())) / np.sqrt(len(end)) for end in (off[:ENDS], off[-ENDS:]))
+        agrees = strays(float(off @ off), len(off), noise_mm, each_mm) <= AGREED and at_ends <= AGREED * noise_mm
+        if len(off) >= LEAST and agrees:
             out[a, b] = move
     return out
 
