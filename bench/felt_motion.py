@@ -30,6 +30,7 @@ LIKELY, CHANCE = 4.0, 5.0  # standard deviations: levels nearer are one, samples
 FEWEST = 10  # samples of a level within a hold
 BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
 TOGETHER = 20  # samples that share the error of a window, about
+BESIDE = 2.5  # deviations of a reading from where its window puts it, that are more than its noise
 ASTRAY = 1.4  # times what noise makes of a window's value: so far off is it, in sines of any speed
 WIDTH = 2.2  # standard deviations on either side of a value
 
@@ -355,6 +356,9 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
             stretch[inside] = 1 + len(clean) + first
         # a window grows until it shows that the motion is no parabola: by then it is off by as much again
         std = np.where(stretch < 0, np.minimum(ASTRAY * std, np.maximum(std, noise)), std)
+        # at a corner a window that it hardly shows in may be off by as much as the reading is from it
+        beside = np.abs(position_mm - clean)
+        std = np.where((stretch < 0) & (beside > BESIDE * begun.noise.each_mm), np.maximum(std, beside), std)
         # a coarse scale's error averages out over levels that are passed, not over readings of one
         std = np.where(np.abs(np.gradient(clean)) < 2.0 * step, np.maximum(std, coarse), std)
     time, position = motion_between(time_s, clean, noise_mm=left, planned=planned)
