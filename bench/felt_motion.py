@@ -340,7 +340,7 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
     if begun.smoother:
         step, coarse = resolution(position_mm), _coarse(position_mm)
         stretch = np.where(hold > 0, hold, stretch)
-        planned, others = planned_moves(time_s, position_mm, clean, noise, left, hold > 0, begun.noise.each_mm)
+        planned, others = planned_moves(time_s, position_mm, clean, begun.noise, left, hold > 0)
         worse = float(np.sqrt(max(missed(planned, time_s, position_mm, noise)[0], 1.0)))
         for (first, last), move in planned.items():
             inside = slice(first, last + 1)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from bench.profiles import PLAIN, Smoothing, Trapezoid, profile
+
+if TYPE_CHECKING:
+    from bench.position_noise import PositionNoise
 
 Array = NDArray[np.float64]
 Group = tuple[int, int]
@@ -73,21 +77,21 @@ class _Asked:
         groups = [self.groups[k] for k in index.tolist()]
         return _Asked(groups, self.starts[index], self.ends[index], moves, self.allowed[index])
 
-    def cost(self, acceleration: float, smoothing: Smoothing) -> float:
-        """What profiles of an acceleration leave."""
-        squares = _fitted(self.moves, acceleration, smoothing)[2]
+    def cost(self, shape: Shape) -> float:
+        """What profiles of a shape leave."""
+        squares = _fitted(self.moves, shape)[2]
         scale = np.where(self.told, 1 / self.allowed**2, 0.0)
         # A move that is no trapezoid at any acceleration must not decide for the others.
         # Two samples inside a move are met by any acceleration above the true one: the least one counts.
-        least = GENTLE * np.count_nonzero(self.told) * np.log(acceleration)
+        least = GENTLE * np.count_nonzero(self.told) * np.log(shape[1])
         return float(np.sum(self.moves.count * np.log1p(squares * scale / np.maximum(self.moves.count, 1))) + least)
 
     def acceleration(self, reach: float) -> float:
         """The acceleration of which trapezoids leave the least, mm/s²."""
-        scanned = [self.cost(a * reach, PLAIN) for a in SCAN]
+        scanned = [self.cost((PLAIN, a * reach)) for a in SCAN]
         best = int(np.argmin(scanned))
         low, high = np.log(SCAN[max(best - 1, 0)] * reach), np.log(SCAN[min(best + 1, len(SCAN) - 1)] * reach)
-        return _golden(lambda g: self.cost(float(np.exp(g)), PLAIN), float(low), float(high))
+        return _golden(lambda g: self.cost((PLAIN, float(np.exp(g)))), float(low), float(high))
 
 
 def _asked(
@@ -133,12 +137,13 @@ def fitted_moves(
     if asked is None:
         return {}
     moves, told, allowed = asked.moves, asked.told, asked.allowed
-    smoothing, acceleration = (PLAIN, asked.acceleration(reach)) if shape is None else shape
-    middle, speed, squares = _fitted(moves, acceleration, smoothing)
+    shape = shape or (PLAIN, asked.acceleration(reach))
+    smoothing, acceleration = shape
+    middle, speed, squares = _fitted(moves, shape)
     observed = moves.speed
     for factor in (0.8, 1.3):  # a search that ended beside a corner is begun again on its other side
         moves.speed = factor * observed
-        again = _fitted(moves, acceleration, smoothing)
+        again = _fitted(moves, shape)
         better = again[2] < squares
         middle, speed, squares = (
             np.where(better, new, old) for new, old in zip(again, (middle, speed, squares), strict=True)
@@ -148,7 +153,7 @@ def fitted_moves(
     if lone.any():  # one sample inside tells when, not how fast: as the others
         usual = float(np.median(speed[cruised])) if cruised.any() else np.inf
         moves.speed = np.where(lone, BEGUN * np.maximum(usual, moves.way / moves.duration), speed)
-        alone = _fitted(moves, acceleration, smoothing, lone)
+        alone = _fitted(moves, shape, lone)
         middle, speed, squares = (
             np.where(lone, new, old) for new, old in zip(alone, (middle, speed, squares), strict=True)
         )
@@ -158,7 +163,7 @@ def fitted_moves(
             one = slice(k, k + 1)  # by all its samples, from what a few of them tell
             whole = _sampled(t, x, asked.groups[one], asked.starts[one], asked.ends[one], fitted, len(t), allowed[one])
             whole.middle, whole.speed = middle[one], speed[one]
-            (middle[k],), (speed[k],), _ = _fitted(whole, acceleration, smoothing)
+            (middle[k],), (speed[k],), _ = _fitted(whole, shape)
     more = moves.count >= 3
     if more.any() and np.mean(good[more]) < 0.5:
         return {}  # no trapezoids: those with too few samples to tell are none either
@@ -174,12 +179,12 @@ def fitted_moves(
 
 
 def smoothed_shape(
-    t: Array, x: Array, moving: NDArray[np.bool_], groups: list[Group], reach: float, noise: float, fitted: Array,
-    resting: NDArray[np.bool_] | None = None, back: float = 0.0, each: float | None = None,
+    t: Array, x: Array, moving: NDArray[np.bool_], groups: list[Group], reach: float, noise: PositionNoise,
+    fitted: Array, resting: NDArray[np.bool_] | None = None, back: float = 0.0,
 ) -> tuple[Shape | None, Shape | None]:  # fmt: skip
     """(what smooths the moves, where they are trapezoids but for that: None where they are as they are, or something
-    else; what these samples exclude as little). `noise`: of means of samples; `each`: of one, where that is another."""
-    every = _asked(t, x, moving, groups, noise, fitted, SHOWING, resting, back)
+    else; what these samples exclude as little)."""
+    every = _asked(t, x, moving, groups, noise.of_means_mm, fitted, SHOWING, resting, back)
     if every is None:
         return None, None
     # where a move turns round at once, the end of the one before is in it
@@ -190,32 +195,33 @@ def smoothed_shape(
         return None, None
     asked = every.only(telling[np.argsort(-every.moves.speed[telling], kind="stable")[:FASTEST]])
 
-    n, plain = asked.moves.count.astype(np.float64), asked.acceleration(reach)
-    lags = [(np.sqrt(12.0) * std, 0.0) for std in SMOOTHED_S] + [(0.0, std / np.sqrt(2.0)) for std in SMOOTHED_S]
-    begun = [np.array([np.log(factor * plain), *lag]) for lag in lags for factor in FASTER]
-
-    def cost(numbers: Array) -> float:
-        return asked.cost(float(np.exp(min(numbers[0], 25.0))), _smoothing(numbers))
-
-    def left(numbers: Array) -> Array:
-        return _fitted(asked.moves, float(np.exp(min(numbers[0], 25.0))), _smoothing(numbers))[2]
-
-    as_they_are = left(np.array([np.log(plain), 0.0, 0.0]))
-
-    sigma, memory = (noise, 1.0) if each is None else (each, (noise / each) ** 2)
-    agreed = strays(as_they_are, n, noise, each) <= AGREED
-    enough = np.sum(n[agreed]) - 2.0 * np.sqrt(2.0 * np.sum(n[agreed]) * memory) + memory * TAKEN
-    if np.mean(agreed) >= MOSTLY and float(np.sum(as_they_are[agreed])) < enough * sigma**2:
+    n, bare = asked.moves.count.astype(np.float64), (PLAIN, asked.acceleration(reach))
+    as_they_are = _fitted(asked.moves, bare)[2]
+    agreed = strays(as_they_are, n, noise) <= AGREED
+    told = float(np.sum(n[agreed]))
+    enough = told - 2.0 * np.sqrt(2.0 * told * noise.memory) + TAKEN * noise.memory
+    if np.mean(agreed) >= MOSTLY and float(np.sum(as_they_are[agreed])) < enough * noise.each_mm**2:
         return None, None  # there is nothing to take
-    found = min((_searched(cost, start) for start in sorted(begun, key=cost)[:STARTED]), key=lambda r: r[1])[0]
-    smoothed = left(found)
+    shape = _smoothed(asked, bare[1])
+    smoothed = _fitted(asked.moves, shape)[2]
     of_all = np.sqrt(smoothed / n) <= asked.allowed  # others are no such profiles at all
-    each_left = max(float(np.sum(smoothed[of_all])) / max(float(np.sum(n[of_all])), 1.0), sigma**2)
-    taken = float(np.sum((as_they_are - smoothed)[of_all])) / each_left / memory
-    shape, bare = (_smoothing(found), float(np.exp(found[0]))), (PLAIN, plain)
+    each_left = max(float(np.sum(smoothed[of_all])) / max(float(np.sum(n[of_all])), 1.0), noise.each_mm**2)
+    taken = float(np.sum((as_they_are - smoothed)[of_all])) / each_left / noise.memory
     if taken < TAKEN:
         return None, shape if taken > 0.0 else None
     return shape, bare if taken < SURELY else None
+
+
+def _smoothed(asked: _Asked, plain_mm_s2: float) -> Shape:
+    """The smoothed shape that leaves the least, sought from some that plain trapezoids of an acceleration may be."""
+    lags = [(np.sqrt(12.0) * std, 0.0) for std in SMOOTHED_S] + [(0.0, std / np.sqrt(2.0)) for std in SMOOTHED_S]
+    begun = [np.array([np.log(factor * plain_mm_s2), *lag]) for lag in lags for factor in FASTER]
+
+    def cost(numbers: Array) -> float:
+        return asked.cost(_shape(numbers))
+
+    ended = [_searched(cost, start) for start in sorted(begun, key=cost)[:STARTED]]
+    return _shape(min(ended, key=lambda end: end[1])[0])
 
 
 def _searched(cost: Callable[[Array], float], start: Array) -> tuple[Array, float]:
@@ -226,15 +232,15 @@ def _searched(cost: Callable[[Array], float], start: Array) -> tuple[Array, floa
     return found.x, float(found.fun)
 
 
-def _smoothing(numbers: Array) -> Smoothing:
-    return Smoothing(abs(float(numbers[1])), abs(float(numbers[2])))
+def _shape(numbers: Array) -> Shape:
+    """Of the numbers that a search has: logarithm of the acceleration, width and lag in s."""
+    return Smoothing(abs(float(numbers[1])), abs(float(numbers[2]))), float(np.exp(min(numbers[0], 25.0)))
 
 
-def strays(squares: Array | float, count: Array | float, noise: float, each: float | None) -> Array:
+def strays(squares: Array | float, count: Array | float, noise: PositionNoise) -> Array:
     """Standard deviations of χ² by which sums of squares of `count` samples are more than `NOISIER` times the noise of
-    `each` of them; `noise` is that of means: where it is more, some samples say the same."""
-    sigma = noise if each is None else each
-    return np.asarray((squares / sigma**2 - NOISIER * count) / (np.sqrt(2.0 * count) * noise / sigma))
+    each of them, some of which say the same."""
+    return np.asarray((squares / noise.each_mm**2 - NOISIER * count) / np.sqrt(2.0 * count * noise.memory))
 
 
 def from_rest(moving: NDArray[np.bool_], x: Array, group: Group, back: float = 0.0) -> bool:
@@ -301,10 +307,9 @@ def _sampled(
     return _Sampled(time, gone, used, way, middle, speed, np.array([len(p) for p in picked]), duration)
 
 
-def _fitted(
-    moves: _Sampled, acceleration: float, smoothing: Smoothing, speed_kept: NDArray[np.bool_] | None = None
-) -> tuple[Array, Array, Array]:
+def _fitted(moves: _Sampled, shape: Shape, speed_kept: NDArray[np.bool_] | None = None) -> tuple[Array, Array, Array]:
     """Middle, speed and Σ error² of each move, by damped Gauss-Newton steps on all moves at once, (m,) each."""
+    smoothing, acceleration = shape
     fastest = np.sqrt(acceleration * moves.way)
     slowest = moves.way / moves.duration
     middle, speed = moves.middle.copy(), np.clip(moves.speed, np.minimum(slowest, fastest), fastest)

@@ -15,12 +15,16 @@ Measured samples stay as they are: the curve is bent to go through each of them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.fitted_moves import AGREED, ALL, Moves, fitted_moves, smoothed_shape, strays
 from bench.profiles import Trapezoid
+
+if TYPE_CHECKING:
+    from bench.position_noise import PositionNoise
 
 Array = NDArray[np.float64]
 
@@ -75,14 +79,12 @@ def planned_moves(
     time_s: Array,
     position_mm: Array,
     clean_mm: Array,
-    noise_mm: float,
+    noise: PositionNoise,
     left_mm: float,
     resting: NDArray[np.bool_] | None = None,
-    each_mm: float | None = None,
 ) -> tuple[Moves, Moves]:
-    """Moves whose noisy positions (n,) are those of a trapezoid and nothing else, within the noise of the samples:
-    `noise_mm` of means over many, `each_mm` of one, where that is another. And those of them that may be of another
-    shape as well, in that.
+    """Moves whose noisy positions (n,) are those of a trapezoid and nothing else, within the noise of the samples. And
+    those of them that may be of another shape as well, in that.
 
     `clean_mm` (n,): the same positions smoothed, with noise `left_mm`: they tell where moves begin and end. `resting`
     (n,): where they are means over a long rest; a move begins and ends at such a level where one is near.
@@ -92,7 +94,7 @@ def planned_moves(
         return {}, {}
     out: Moves = {}
     asked, shape, other = False, None, None
-    back = 4.0 * noise_mm
+    noise_mm, back = noise.of_means_mm, 4.0 * noise.of_means_mm
     for quiet_mm in (left_mm, noise_mm):  # what is left beside a move may hide that it begins at rest
         moving = _carried_on(_moving(clean_mm, reach, quiet_mm)[0], clean_mm)
         pieces = [_onward(clean_mm, *group) for group in _grouped(moving, moving)]
@@ -103,12 +105,12 @@ def planned_moves(
                 if not asked:
                     asked = True
                     shape, other = smoothed_shape(
-                        time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, resting, back, each_mm
+                        time_s, clean_mm, moving, groups, reach, noise, position_mm, resting, back
                     )
                 found = fitted_moves(
                     time_s, clean_mm, moving, groups, reach, noise_mm, position_mm, ALL, resting, back, shape
                 )
-                told = _told(found, time_s, position_mm, noise_mm, each_mm)
+                told = _told(found, time_s, position_mm, noise)
                 out |= {k: v for k, v in told.items() if not any(k[0] < o[1] and o[0] < k[1] for o in out)}
     power, parts = missed(out, time_s, position_mm, noise_mm)
     if not out or power > LOOSE + AGREED * np.sqrt(2.0 / parts):
@@ -158,19 +160,19 @@ def _chained(position_mm: Array, pieces: list[tuple[int, int]], gap: int) -> lis
     return out
 
 
-def _told(found: Moves, time_s: Array, position_mm: Array, noise_mm: float, each_mm: float | None) -> Moves:
+def _told(found: Moves, time_s: Array, position_mm: Array, noise: PositionNoise) -> Moves:
     """Those that the noisy positions agree with, with the slow beginnings and ends that hide in the noise. What goes no
     farther than noise does is none: a coarse scale hops to and fro, and a mass would feel that as blows."""
     out = {}
     for (first, last), move in found.items():
-        if abs(move.way_mm) < FARTHER * noise_mm:
+        if abs(move.way_mm) < FARTHER * noise.of_means_mm:
             continue
         begin_s, end_s = move.span_s()
         a = min(first, max(int(np.searchsorted(time_s, begin_s)) - 1, 0))
         b = max(last, min(int(np.searchsorted(time_s, end_s)) + 1, len(time_s) - 1))
         off = position_mm[a : b + 1] - move.position(time_s[a : b + 1])
         at_ends = max(abs(float(end.sum())) / np.sqrt(len(end)) for end in (off[:ENDS], off[-ENDS:]))
-        agrees = strays(float(off @ off), len(off), noise_mm, each_mm) <= AGREED and at_ends <= AGREED * noise_mm
+        agrees = strays(float(off @ off), len(off), noise) <= AGREED and at_ends <= AGREED * noise.of_means_mm
         if len(off) >= LEAST and agrees:
             out[a, b] = move
     return out

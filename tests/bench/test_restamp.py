@@ -106,8 +106,7 @@ def test_moves_between_noisy_rests_are_found() -> None:
         m = measurement(c)
         read = position_noise(m.position_mm)
         clean, std = smoothed(m.position_time_s, m.position_mm, read)
-        noise, left = read.of_means_mm, float(np.median(std))
-        found, _ = planned_moves(m.position_time_s, m.position_mm, clean, noise, left)
+        found, _ = planned_moves(m.position_time_s, m.position_mm, clean, read, float(np.median(std)))
         at = c.truth.motion.breaks_s
         speed = np.abs(c.truth.motion.velocity(0.5 * (at[1:] + at[:-1])))
         fast = at[:-1][(speed > 5.0)]
