@@ -278,6 +278,7 @@ this page find it by its id.
 3. Say what a fit needs: `amplitude` for the number that switches the effect off at 0, `starts` for shapes,
    `floor` for values that no data can show, `fixed` for choices. A lower bound above 0 means a fit on the logarithm.
    `of_motion=False` where it runs in time or stands at a level: one press and one hold then suffice for a sure name.
+   A form of it that goes with the motion all the same says so.
 4. Give the family the shapes its physics takes, the first parameters the same in all.
 5. `tests/sim/test_effects.py` tries every form by itself and in all pairs. Add its physics beside, against a closed
    form. A line in `GROUPS` of `docs/effects.py` gives it a place on this page.

@@ -185,7 +185,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         doubts=[*doubts(m, search.believed.pad.pad, path.fits[0].pad), *prepared.said_of_noise],
         remainders=tests,
         name=m.name,
-        seen_once=any(most_sure(all_effects()[c.id], search.reach.rich) < 1.0 for c in causes),
+        seen_once=any(most_sure(all_effects()[c.id], c.form, search.reach.rich) < 1.0 for c in causes),
         time_s=full.time_s[at],
         position_mm=full.position_mm[at],
         force_N=raw.force_N[at],

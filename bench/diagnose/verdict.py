@@ -239,7 +239,7 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
         id_, form, numbers = described(final, own + k)
         cause = final.structure.causes[own + k]
         values = {name: number.value for name, number in numbers.items()}
-        most = min(told_size(final, own + k), most_sure(cause.effect, search.reach.rich))
+        most = min(told_size(final, own + k), most_sure(cause.effect, cause.form.name, search.reach.rich))
         most = min(most, SLIGHTLY) if len(gains) > 1 and gain < SLIGHT else most
         most = min(most, ANOTHERS) if departed(search.short, final, own + k) else most
         confidence, kind = min(confidence, most), min(kind, most)

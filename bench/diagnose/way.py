@@ -61,9 +61,10 @@ def shown_on_the_way(data: Data) -> float:
     return np.unique(parts).size / PARTS
 
 
-def most_sure(effect: Effect, rich: bool) -> float:
-    """How sure the name of an effect can be at the most. `rich`: whether the data are, or none is of a pad."""
-    return 1.0 if rich or not effect.of_motion else TOLD_ONCE
+def most_sure(effect: Effect, form: str, rich: bool) -> float:
+    """How sure the name of an effect can be at the most, in a form. `rich`: whether the data are, or none is of a
+    pad."""
+    return 1.0 if rich or not effect.goes_with_motion(form) else TOLD_ONCE
 
 
 def _passes(position_mm: NDArray[np.float64], least_mm: float) -> int:

@@ -108,6 +108,8 @@ class Form:
     """Whether a diagnosis tries the form; one that can pass for another cause simulates only."""
     amend: Callable[[Pad, Mapping[str, float]], Pad] | None = None
     """Another pad in place of the one described: another law, a further mode, contact that lets go."""
+    of_motion: bool = False
+    """Whether it goes with the motion, where its effect by itself does not (see `Effect.of_motion`)."""
 
     def __post_init__(self) -> None:
         unknown = set(self.blocks) - (set(PLACES) - {"law"})
@@ -148,6 +150,10 @@ class Effect:
     def explanation(self, values: Mapping[str, float]) -> str:
         """`says` with numbers in it; `what` where the effect has no such sentence."""
         return read(self.says, values) if self.says else self.what
+
+    def goes_with_motion(self, form: str | None = None) -> bool:
+        """Whether it acts with the motion in the form of that name (see `form`)."""
+        return self.of_motion or self.form(form).of_motion
 
     def form(self, name: str | None = None) -> Form:
         """The form `name`, or the first; KeyError when there is none of that name."""

@@ -164,6 +164,7 @@ EFFECT = Effect(
             sought=False,
             blocks={"sensor": returning},
             state=(0.0, 0.0),
+            of_motion=True,
         ),
         Form(
             name="along",
@@ -175,6 +176,7 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"probe": along},
+            of_motion=True,
         ),
         Form(
             name="in_motion",
@@ -183,6 +185,7 @@ EFFECT = Effect(
             sought=False,
             blocks={"probe": in_motion},
             state=(0.0, 0.0, 0.0),
+            of_motion=True,
         ),
     ),
 )
