@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from .data import Data, Prepared
 from .drift_in_air import told_in_air
 from .evidence import believable, penalty, unexplained
 from .late import LATE, as_late, lateness_s
+from .modes import NAMED as MISSING
+from .modes import missing_told
 from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
 from .path import Trial
@@ -280,26 +283,35 @@ class Sieve:
         usual = next((t for t in trials if t.usual and t is not trials[0]), None)
         if usual is not None:  # from its own start: where another form has ended may be a bad one
             out.append(self._carried(usual, MORE))
-        tried = {best.cause.form.name}
+        dealt = next((d for d in map(self._dealt, out) if d is not None), None)
+        root = dealt or best
+        tried = {root.cause.form.name}
         for form in family:
-            if form.name in tried or (form.amend is not None and best.cause.amplitude is None):
+            if form.name in tried or (form.amend is not None and root.cause.amplitude is None):
                 continue
             tried.add(form.name)
-            cause = cause_of(best.cause.effect, form)
-            shared = {p.name for p in cause.fitted} & {p.name for p in best.cause.fitted}
-            values = best.fit.structure.values(best.fit.x)[-1]
+            cause = cause_of(root.cause.effect, form)
+            shared = {p.name for p in cause.fitted} & {p.name for p in root.cause.fitted}
+            *before, values = root.fit.structure.values(root.fit.x)
             cause = cause.with_start(**{name: values[name] for name in shared})
             structure = fit.structure.with_cause(cause)
-            pad = best.fit.x[: len(structure.pad.coordinates)]
-            before = best.fit.structure.values(best.fit.x)[:-1]
-            x = structure.x(pad, [*before, cause.start], best.fit.of_run)
+            pad = root.fit.x[: len(structure.pad.coordinates)]
+            x = structure.x(pad, [*before, cause.start], root.fit.of_run)
             begun = self._solved(structure, x, FEW, None)
             own = self._of_its_own(fit, form, trials, found, known)
-            if own is not None and (begun is None or own.score < begun.score):
+            further = own is not None and (begun is None or own.score < begun.score)
+            if own is not None and further:
                 out.append(self._falling(own))
-            elif begun is not None:
+            if begun is not None and (dealt is not None or not further):
                 out.append(self._carried(begun, MORE))
         return sorted(out, key=lambda t: t.score)
+
+    def _dealt(self, trial: Trial) -> Trial | None:
+        """A trial of one more mode with the modes dealt out as they should be, None where it is none: of modes that are
+        all alike any can be the one too many, but another shape is that of the one which is."""
+        if trial.id != MISSING or not trial.usual:
+            return None
+        return replace(trial, fit=replace(trial.fit, x=missing_told(trial.fit, self.believed)))
 
     def _of_its_own(self, fit: Fit, form: Form, trials: list[Trial], found: list[Start], known: Array) -> Trial | None:
         """A few steps of a form from its own best start, taken from the sieve if they are done; None: a poor start."""
