@@ -14,6 +14,7 @@ from scipy.stats import chi2 as chi2_law
 
 Array = NDArray[np.float64]
 
+FEWEST_SAMPLES = 500
 LOWEST_HZ = 1.5
 SPARED = 24  # ordinates of lowest frequency: there the numbers fitted, and slow drifts, have a say
 FEWEST, BANDS_PER_OCTAVE = 12, 10  # ordinates of a band, and how narrow bands are where there are enough
@@ -34,9 +35,15 @@ class Swing:
 
 def find(time_s: Array, error_N: Array, sample_s: float) -> Swing | None:
     """The strongest swing in errors (n,) at stamps (n,); None where the spectrum does not rise anywhere."""
-    if len(error_N) < 500:
+    if len(error_N) < FEWEST_SAMPLES:
         return None
     slot = np.rint((time_s - time_s[0]) / sample_s).astype(np.intp)
+    # a stretch that was sampled more coarsely would show what is slow in it at the grid's high frequencies again
+    apart = np.concatenate([[True], np.diff(slot) > 1, [True]])
+    close = ~(apart[1:] & apart[:-1])
+    if close.sum() < FEWEST_SAMPLES:
+        return None
+    slot, error_N = slot[close], error_N[close]
     grid = np.zeros(int(slot[-1]) + 1)
     grid[slot] = error_N - error_N.mean()
     power = np.abs(np.fft.rfft(grid)) ** 2

@@ -127,6 +127,14 @@ def test_noise_in_short_holds_far_apart_does_not_swing():
     assert alarms <= 3
 
 
+def test_noise_that_is_sampled_more_coarsely_from_a_moment_on_does_not_swing():
+    """What is slow in it stands again at the fine samples' high frequencies."""
+    for seed in range(20):
+        noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(seed).standard_normal(12000))
+        time_s = np.cumsum(np.where(np.arange(12000) < 9000, 1.0 / 600.0, 1.0 / 150.0))
+        assert swing.find(time_s, noise, 1.0 / 600.0) is None
+
+
 def test_what_stands_beside_a_swing_is_told():
     rng, t = np.random.default_rng(5), 0.002 * np.arange(20_000)
     turn = np.exp((-0.02 + 1j) * 2.0 * np.pi * 5.0 * 0.002)
