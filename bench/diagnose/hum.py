@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize, minimize_scalar
 
-from sim.effects.mains_hum import first_of_dimmed
+from sim.effects.mains_hum import first_of_dimmed, let_through
 
 from .noise import Part
 
@@ -79,7 +79,7 @@ class Line:
         first = angle + self.phase_rad
         if self.fires_rad:
             whole = swells / np.hypot(*first_of_dimmed(self.fires_rad))
-            return np.asarray(whole * np.sin(first) * (first % np.pi > self.fires_rad))
+            return np.asarray(whole * np.sin(first) * let_through(first, self.fires_rad))
         if self.bursts:
             waves, fed, begins = self.bursts
             on = (np.floor(first / (2.0 * np.pi)) - begins) % waves < fed

@@ -5,8 +5,8 @@ Phases are at the first sample.
 - `sine`: amplitude · sin(2πft + phase).
 - `harmonics`: with the third harmonic, which rectifiers and saturated transformers make.
 - `flat_topped`: with the third, the fifth and the seventh, as rectifiers make that draw from the crests alone.
-- `dimmed`: a dimmer lets each half wave through from an angle `fires` on (IEC 61000-3-2); `amplitude` is that of the
-  first harmonic, `phase` that of the mains.
+- `dimmed`: a dimmer lets each half wave through from an angle `fires` on (IEC 61000-3-2), its choke making the edge a
+  tenth of a millisecond long; `amplitude` is that of the first harmonic, `phase` that of the mains.
 - `distorted`: with all harmonics from the second to the seventh; rectifiers of half waves make the even ones.
 - `swinging`: amplitude and phase swing slowly, amplitude · (1 + swell · sin(2πt/period + …)) ·
   sin(2πft + phase + wander · sin(2πt/period + …)), as the grid's frequency does and what else it feeds.
@@ -27,6 +27,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.effects.waves import phase
@@ -57,9 +60,20 @@ def flat_topped(dt: float, force: float, state: State, p: State) -> float:
     return force + p[0] * (wave + p[5] * math.sin(5.0 * angle + p[6]) + p[7] * math.sin(7.0 * angle + p[8]))
 
 
+RISE_RAD = (
+    0.04  # a tenth of a millisecond of a wave of 50 or 60 Hz: of an edge without length no sample says where it is
+)
+
+
 def first_of_dimmed(fires: float) -> tuple[float, float]:
-    """Sine and cosine of the first harmonic of sin θ where θ mod π > fires, 0 elsewhere."""
-    return 1.0 - (fires - 0.5 * math.sin(2.0 * fires)) / math.pi, -(math.sin(fires) ** 2) / math.pi
+    """Sine and cosine of the first harmonic of sin θ let through from `fires` on, the edge as long as a dimmer's."""
+    middle = fires + 0.5 * RISE_RAD
+    return 1.0 - (middle - 0.5 * math.sin(2.0 * middle)) / math.pi, -(math.sin(middle) ** 2) / math.pi
+
+
+def let_through(angle: NDArray[np.float64], fires: float) -> NDArray[np.float64]:
+    """What a dimmer lets through of the mains at angles (n,), rad: from 0 to 1."""
+    return np.clip((angle % math.pi - fires) / RISE_RAD, 0.0, 1.0)
 
 
 @block
@@ -67,7 +81,7 @@ def dimmed(dt: float, force: float, state: State, p: State) -> float:
     """Force with the hum; p = (amplitude of the whole wave, frequency, phase, fires)."""
     state[0] += dt
     angle = 2.0 * math.pi * p[1] * state[0] + p[2]
-    return force + p[0] * math.sin(angle) if angle % math.pi > p[3] else force
+    return force + p[0] * min(max((angle % math.pi - p[3]) / RISE_RAD, 0.0), 1.0) * math.sin(angle)
 
 
 def _whole(values: Mapping[str, float]) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lsim
 
 from sim.effects import effect
-from sim.effects.mains_hum import first_of_dimmed
+from sim.effects.mains_hum import RISE_RAD, first_of_dimmed, let_through
 from sim.elastic import Exponential
 from sim.pad import Cascade, Pad
 from sim.relaxation import Relaxation
@@ -135,11 +135,13 @@ def test_hum_of_a_dimmer() -> None:
         hum = active("mains_hum", "dimmed", amplitude=0.1, frequency=50.0, phase=0.7, fires=fires)
         out = sense(hum, t, np.zeros(t.size))
         wave = np.sin(2 * math.pi * 50 * t + 0.7)
-        dark = (2 * math.pi * 50 * t + 0.7) % math.pi < fires
-        assert np.all(out[dark] == 0.0) and np.ptp(out[~dark] / wave[~dark]) < 1e-9
+        since = (2 * math.pi * 50 * t + 0.7) % math.pi - fires
+        dark, lit = since < 0.0, since > RISE_RAD
+        assert np.all(out[dark] == 0.0) and np.ptp(out[lit] / wave[lit]) < 1e-9
+        assert 0.9e-4 < RISE_RAD / (2 * math.pi * 55) < 1.3e-4, "of a tenth of a millisecond"
         assert_allclose(np.abs(np.fft.rfft(out))[10] / 10_000, 0.1, rtol=5e-3)
         angle = (np.arange(100_000) + 0.5) / 100_000 * 2 * math.pi
-        cut = np.sin(angle) * (angle % math.pi > fires)
+        cut = np.sin(angle) * let_through(angle, fires)
         assert_allclose(
             first_of_dimmed(fires), [2 * np.mean(cut * np.sin(angle)), 2 * np.mean(cut * np.cos(angle))], atol=1e-4
         )

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.diagnose import diagnose
 from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.hum import Line, find
@@ -56,6 +57,19 @@ def test_a_sine_has_no_harmonics_where_they_would_be_folded_beside_it(rate_hz, s
     assert line is not None
     assert (line.ratio, line.higher, line.fires_rad) == (0.0, (), 0.0)
     assert np.sqrt(np.mean((line.force_N(t, force) - hum) ** 2)) < 0.02 * 0.04
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.long) for s in (2, 3, 4, 5, 6))])
+def test_how_sure_the_numbers_of_a_dimmer_are_is_told(seed):
+    """Their edges lie between samples: an edge without length would leave open when they come, and all with it."""
+    c = draw_case(seed, ("mains_hum",), 0.7, "dimmer", protocol="staircase", rate_hz=390.0)
+    found = diagnose(measurement(c), Model.from_dict(c.believed)).causes[0]
+    amplitude_N, told = c.truth.parameters["mains_hum"]["amplitude"], found.parameters["amplitude"]
+    assert (found.id, found.form) == ("mains_hum", "dimmed")
+    assert 0.0 < told.std < 0.05 * amplitude_N
+    assert told.value == pytest.approx(amplitude_N, rel=0.05)
+    assert 1e-4 < found.parameters["fires"].std < 0.1
 
 
 @pytest.mark.parametrize("seed", range(3))
