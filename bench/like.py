@@ -9,7 +9,7 @@ serves the model clearly better.
 
 What a run took for zero (its tare) counts as zero of the model too, as in a diagnosis: friction or a bias that the load
 cell felt before contact is not in its net force. The tare's own error is found again within its doubt, as the surface
-is.
+is; and so is the state that a pad was in when the data begin amid its load, as in a fit and a diagnosis.
 """
 
 from __future__ import annotations
@@ -20,31 +20,38 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import least_squares, minimize_scalar
 
 from bench.diagnose.asked_again import NEAR
 from bench.diagnose.channel import Faults, faults, standing_off
 from bench.diagnose.data import prepare
 from bench.errors import InputError
 from bench.felt_motion import felt
+from bench.identify.noise import noise_of
+from bench.identify.past import begins_inside
 from bench.identify.problem import sized
 from bench.position_noise import resolution
 from bench.recording.types import Measurement
 from bench.restamp import restamped
 from sim.grid import union
 from sim.model import Model
+from sim.pad import Cascade, Past
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FARTHEST = 6.0
-"""Standard deviations that a surface may be moved; as many as in a fit (`identify.surface`)."""
+"""Standard deviations that a surface may be moved; as many as in a fit (`identify.surface`). And times the greatest
+force, that the past may have left in a mode."""
 
 CLOSE = 1e-4
 """Standard deviations to which the best place is found."""
 
 MOST_ZERO = 4.0
 """How far off a tare may be, in its standard deviations."""
+
+STEPS = 20
+"""To the state that a pad was in when the data begin, at the most."""
 
 CLEARLY = 0.005
 """Share of the error by which the motion as felt must be better than the positions as they are."""
@@ -57,6 +64,7 @@ class Likeness:
     `moved_mm`: depth added to the positions, 0 where the surface is certain. `flagged` (m,): samples that a fault of
     the force channel has made, as a diagnosis flags them. `rmse_N`: over the samples that count and are not flagged;
     `rmse_with_flagged_N`: over all that count. `rmse_as_reported_N`: as `rmse_N`, on the positions as they are.
+    `begins_inside`: the pad is in contact from the first sample on, in a state that was found.
     """
 
     measurement: Measurement
@@ -66,11 +74,14 @@ class Likeness:
     rmse_with_flagged_N: float
     flagged: Mask
     rmse_as_reported_N: float = math.nan
+    begins_inside: bool = False
 
     @property
     def sentence(self) -> str:
         """What was left out, and what was done to the surface, for people; empty where nothing was."""
         said = []
+        if self.begins_inside:
+            said.append("the data begin amid the pad's load, in the state that serves the model best")
         if self.rmse_as_reported_N > self.rmse_N:
             said.append(
                 f"the motion taken as the pad felt it ({self.rmse_as_reported_N:.6g} N on the positions as reported)"
@@ -91,7 +102,8 @@ class Likeness:
 
 
 def likeness(model: Model, measurement: Measurement) -> Likeness:
-    """The model's force over the measured motion, from rest.
+    """The model's force over the measured motion, from rest, or from the state that serves it best where the data begin
+    amid the pad's load.
 
     Where touch-off stated a doubt, the surface is moved: the shift s with the least Σ e² + V (s/std)², V being the
     mean square error at the best s without that prior. Positions whose surface is certain (CSV) are taken as they are.
@@ -103,7 +115,7 @@ def likeness(model: Model, measurement: Measurement) -> Likeness:
     found = [_along(model, measurement, *path, flagged) for path in _paths(measurement)]
     best = found[-1] if found[-1].rmse_N < (1.0 - CLEARLY) * found[0].rmse_N else found[0]
     flagged = _spoiled(measurement, best.force_N, best.rmse_N, alone)
-    judged = _of(measurement, best.force_N, best.moved_mm, flagged)
+    judged = replace(_of(measurement, best.force_N, best.moved_mm, flagged), begins_inside=best.begins_inside)
     if best is found[0]:
         return judged
     as_reported = _of(measurement, found[0].force_N, found[0].moved_mm, flagged)
@@ -132,8 +144,18 @@ def _along(
     if not tared.any():
         stamps_s, at = stamp_s, np.arange(stamp_s.size)
 
+    def simulated_from(past: Past | None, moved_mm: float = 0.0) -> Array:
+        plant = Cascade(model.pad.physics(), model.cascade.effects, past)
+        return plant.simulate_at(time_s, position_mm + moved_mm, stamps_s)
+
+    past = None
+    inside = begins_inside(measurement, float(position_mm.max()), noise_of([measurement]).position_mm)
+    if inside and model.pad.relaxation.rates:
+        rates = tuple(model.pad.relaxation.rates)
+        past = _past(lambda past: simulated_from(past)[at][counted], measured, rates)
+
     def force(moved_mm: float) -> Array:
-        simulated = model.simulate_at(time_s, position_mm + moved_mm, stamps_s)
+        simulated = simulated_from(past, moved_mm)
         own = simulated[at] - float(np.mean(simulated[tared])) if tared.any() else simulated
         return own + _zero_N(measured - own[counted], measurement.zero_std_N)
 
@@ -146,7 +168,25 @@ def _along(
         moved_mm = _least(square, std)
         V = square(moved_mm) / measured.size
         moved_mm = _least(lambda s: square(s) + V * (s / std) ** 2, std)
-    return _of(measurement, force(moved_mm), moved_mm, flagged)
+    return replace(_of(measurement, force(moved_mm), moved_mm, flagged), begins_inside=past is not None)
+
+
+def _past(simulated_N: Callable[[Past], Array], measured_N: Array, rates: tuple[float, ...]) -> Past:
+    """What modes of these rates begin with so that the force is nearest to the measured one (n,). Forces as large as
+    the greatest are as likely as none, as in a diagnosis."""
+    unit, V = max(float(np.abs(measured_N).max(initial=0.0)), 1e-6), 0.0
+
+    def begun(left: Array) -> Past:
+        return Past(rates, tuple((unit * left).tolist()))
+
+    def error(left: Array) -> Array:
+        return np.append(measured_N - simulated_N(begun(left)), math.sqrt(V) * left)
+
+    left = np.zeros(len(rates))
+    for _ in range(2):  # how much the doubt weighs is known once the state is
+        left = least_squares(error, left, bounds=(-FARTHEST, FARTHEST), max_nfev=STEPS).x
+        V = float(np.mean(error(left)[: measured_N.size] ** 2))
+    return begun(left)
 
 
 def _zero_N(error_N: Array, std_N: float) -> float:

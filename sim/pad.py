@@ -23,6 +23,10 @@ from sim.relaxation import Relaxation
 Array = NDArray[np.float64]
 
 
+_PRESSED, _RESTED = 40, 4
+"""Steps of a second's way in, and at rest, before a run that begins amid the pad's load: sliders lie as after that."""
+
+
 @dataclass(frozen=True)
 class Pad:
     """Elastic response, relaxation, and whether the pad lets go (`unilateral`) or pulls (`bonded`)."""
@@ -39,15 +43,34 @@ class Pad:
     foundation."""
 
 
-class Cascade:
-    """A pad with its effects, ready to run. Immutable; plants made from it have their own state."""
+@dataclass(frozen=True)
+class Past:
+    """What is left of the time before the first sample in modes of some rates, in 1/s: forces beyond those of a pad
+    just pressed, N, that fade as c_i · left_i e^(−ν_i t). Modes of other rates have what stands between."""
 
-    def __init__(self, pad: Pad, effects: Sequence[Active] = ()) -> None:
+    rates: tuple[float, ...]
+    left_N: tuple[float, ...]
+
+    def at(self, rates: Sequence[float]) -> Array:
+        """Forces left in modes (r,), N; none of which a pad without relaxation has."""
+        if not self.rates:
+            return np.zeros(len(rates))
+        order = np.argsort(self.rates)
+        known = np.log(np.array(self.rates)[order])
+        return np.asarray(np.interp(np.log(np.array(rates)), known, np.array(self.left_N)[order]))
+
+
+class Cascade:
+    """A pad with its effects, ready to run. Immutable; plants made from it have their own state. `past`: of a run that
+    begins amid another; else it begins at rest."""
+
+    def __init__(self, pad: Pad, effects: Sequence[Active] = (), past: Past | None = None) -> None:
         for active in effects:
             if active.form.amend is not None:
                 pad = active.form.amend(pad, active.values)
         self.pad = pad
         self.effects = tuple(effects)
+        self.past = past
 
     def __getstate__(self) -> dict[str, object]:
         return {name: value for name, value in self.__dict__.items() if name != "layout"}  # has addresses in it
@@ -125,6 +148,8 @@ class Cascade:
         """(force after the sensor's dynamics, or as the cell feels it; the probe), for true positions."""
         layout = self.layout
         state = layout.state.copy()
+        if self.past is not None and position.size:
+            self._begin(state, float(position[0]), self.past)
         force, probe = np.empty(position.size), np.empty(position.size)
         # where a block changes the rates they are worked out step by step
         decay, gain = grid.fades(() if layout.has("rate") else self.pad.relaxation.rates)
@@ -132,6 +157,18 @@ class Cascade:
         if layout.has("sensor") and not felt_by_cell:
             k.run_chain(layout.program, layout.parameters, state, k.SENSOR, grid.dt_s, force)
         return force, probe
+
+    def _begin(self, state: Array, at_mm: float, past: Past) -> None:
+        """The state where a run begins amid a pad's load: it was pressed to that depth, and what it has gone through
+        has left something in its modes."""
+        way = np.concatenate([np.linspace(min(0.0, at_mm), at_mm, _PRESSED), np.full(_RESTED, at_mm)])
+        dt = np.append(0.0, np.full(way.size - 1, 1.0 / _PRESSED))
+        program, r = self.layout.program, self.pad.relaxation.order
+        spare, none = np.empty((2, way.size)), np.empty((0, way.size))
+        k.run(program, self.layout.parameters, state, dt, way, spare[0], spare[1], none, none)
+        twins = (0, int(program[k.INNER_SIZE]) // 2) if program[k.BONDED] else (0,)
+        for pad in (int(program[k.INNER]) + twin for twin in twins):
+            state[pad + k.W : pad + k.W + r] = state[pad + k.FE] + past.at(self.pad.relaxation.rates)
 
     def _sampled(self, dt: Array, force: Array) -> Array:
         """What sampling makes of a force at its samples, `dt` apart."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bench.errors import InputError
 from bench.felt_motion import Felt, felt
 from bench.identify.noise import stiffness_along
+from bench.identify.past import begins_inside
 from bench.identify.problem import sized, touches
 from bench.position_noise import resolution
 from bench.recording.types import Measurement
@@ -164,6 +165,8 @@ class Prepared:
     zero_N: float
     depth_mm: float
     force_scale_N: float
+    past_N: float
+    """Standard deviation of what the pad's modes may begin with; 0: at rest."""
     position_time_s: Array
     """Stamps of the positions (p,)."""
     motion: Felt
@@ -293,7 +296,7 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
     if line is not None:
         taken_N = line.force_N(felt_s - begins_s, m.force_N)
         m = replace(m, force_N=m.force_N - taken_N)
-    motion = felt(m.position_time_s, m.position_mm)
+    motion, step_mm = felt(m.position_time_s, m.position_mm), resolution(m.position_mm)
     loud = loudness(m, good)
     noise = force_noise(m, good, loud.in_time)
     least = max(rounded(m.force_N[good], resolution(m.force_N)), least_N(m))
@@ -315,12 +318,13 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
     doubt = stiffness * np.interp(m.force_time_s, motion.time_s, motion.doubt_mm)
     sigma[where] = np.hypot(noise_N, np.hypot(np.sqrt(1.0 - whole**2) * through, doubt))
     stretch = np.unique(stretch, return_inverse=True)[1]
-    weight[where] = counted
+    weight[where], depth = counted, max(float(position.max()), 1e-3)
     force[where], hum[where] = m.force_N, np.where(counted, taken_N, 0.0)
-    depth = max(float(position.max()), 1e-3)
+    scale, each_mm = max(float(np.abs(m.force_N[counted]).max()), 1e-6), max(motion.noise.each_mm, 1.05 * step_mm)
+    pressed = begins_inside(m, depth, each_mm)
+    fold = _folds(position, weight, float(np.ptp(position)), pressed)
     full = Data(
-        grid, position, force, weight, sigma, _folds(position, weight, float(np.ptp(position))), shared, stretch,
-        _tared(m, grid), Colour(), sample_s,
+        grid, position, force, weight, sigma, fold, shared, stretch, _tared(m, grid), Colour(), sample_s,
     )  # fmt: skip
     jump_mm = 5.0 * float(np.quantile(motion.std_mm, 0.9))
     owner = _blocks(full, float(np.quantile(stiffness, 0.98)), sigma_force, jump_mm, motion.corners_at(grid))
@@ -337,15 +341,16 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         said_of_noise=loud.said,
         hum=line,
         hum_N=hum,
-        position_noise_mm=max(motion.noise.each_mm, 1.05 * resolution(m.position_mm)),
+        position_noise_mm=each_mm,
         sample_s=sample_s,
         doubt_mm=m.surface_std_mm,
         zero_N=m.zero_std_N,
         depth_mm=depth,
-        force_scale_N=max(float(np.abs(m.force_N[counted]).max()), 1e-6),
+        force_scale_N=scale,
+        past_N=scale if pressed else 0.0,
         position_time_s=m.position_time_s,
         motion=motion,
-        position_step_mm=resolution(m.position_mm),
+        position_step_mm=step_mm,
         felt=FeltErrors(np.zeros(len(grid)), np.zeros(len(grid)), stretch),
     )
 
@@ -357,12 +362,14 @@ def _tared(m: Measurement, grid: Array) -> Mask | None:
     return inside if inside.any() else None
 
 
-def _folds(position: Array, weight: Array, travel_mm: float) -> NDArray[np.intp]:
-    """Contiguous blocks dealt out in turn; half by samples and half by travel, so that fast moves are spread too."""
+def _folds(position: Array, weight: Array, travel_mm: float, pressed: bool) -> NDArray[np.intp]:
+    """Contiguous blocks dealt out in turn, by samples and by travel, so that fast moves are spread too. Of a run that
+    begins `pressed` the first is in none (−1): nothing else tells what its past has left."""
     travel = np.abs(np.diff(position, prepend=position[0]))
     travel[travel < 2e-3 * travel_mm] = 0.0
     along = np.cumsum(weight / max(weight.sum(), 1.0) / 2 + travel / max(travel.sum(), 1e-300) / 2)
-    return np.minimum((along * BLOCKS).astype(np.intp), BLOCKS - 1) % FOLDS
+    block = np.minimum((along * BLOCKS).astype(np.intp), BLOCKS - 1)
+    return np.where((block == 0) & pressed, -1, block % FOLDS)
 
 
 def _blocks(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bench import identify
 from bench.errors import InputError
 from bench.identify.motion import holds
+from bench.identify.past import fitted_past
 from bench.recording.types import Measurement
 from sim.effects import all_effects
 from sim.model import Model
@@ -109,7 +110,7 @@ def believed_structure(model: Model, prepared: Prepared) -> Structure:
             continue
         active = entry.active()
         causes.append(cause_of(active.effect, active.form, active.values))
-    return Structure(pad, tuple(causes), prepared.doubt_mm, prepared.zero_N)
+    return Structure(pad, tuple(causes), prepared.doubt_mm, prepared.zero_N, prepared.past_N)
 
 
 def _pads(m: Measurement, believed: Model, structure: Structure, good: Mask) -> list[Array]:
@@ -182,7 +183,11 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         seconds=time.perf_counter() - begun,
         model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
         notes=list(m.notes),
-        doubts=[*doubts(m, search.believed.pad.pad, path.fits[0].pad), *prepared.said_of_noise],
+        doubts=[
+            *doubts(m, search.believed.pad.pad, path.fits[0].pad),
+            *prepared.said_of_noise,
+            *_of_its_past(prepared),
+        ],
         remainders=tests,
         name=m.name,
         seen_once=any(most_sure(all_effects()[c.id], c.form, search.reach.rich) < 1.0 for c in causes),
@@ -197,6 +202,13 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         ranking=_ranking(path),
         rivals=[(t.id, model_of(believed, t.fit, prepared)) for t in (path.rivals[0][:RIVALS] if path.rivals else [])],
     )
+
+
+def _of_its_past(prepared: Prepared) -> list[str]:
+    """That the run begins amid the pad's load, where it does."""
+    full, first = prepared.full, int(prepared.at[0])
+    begins_loaded = prepared.past_N > 0.0
+    return [fitted_past(float(full.position_mm[first]), float(full.force_N[first]))] if begins_loaded else []
 
 
 def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sim.effects import Active, Effect, Form
 from sim.effects.base import Parameter
 from sim.elastic import ElasticLaw, Exponential, NoPad, Polynomial, Power, Spline
-from sim.pad import Cascade, Pad
+from sim.pad import Cascade, Pad, Past
 from sim.relaxation import Relaxation
 
 Array = NDArray[np.float64]
@@ -171,20 +171,23 @@ def _coordinate(p: Parameter) -> Coordinate:
 
 @dataclass(frozen=True)
 class Structure:
-    """A pad with effects, to be fitted: x = [pad, effects in order, surface, zero].
+    """A pad with effects, to be fitted: x = [pad, effects in order, past, surface, zero].
 
     `doubt_mm`, `zero_N`: standard deviations of the surface and of the force's zero, as touch-off and tare found them;
-    0: certain, and no entry of x.
+    0: certain, and no entry of x. `past_N`: that of what each of the pad's modes begins with, where the run begins in
+    contact (`sim.pad.Past`); 0: it begins at rest.
     """
 
     pad: PadNumbers
     causes: tuple[Cause, ...] = ()
     doubt_mm: float = 0.0
     zero_N: float = 0.0
+    past_N: float = 0.0
     coordinates: tuple[Coordinate, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         found = [*self.pad.coordinates, *(_coordinate(p) for c in self.causes for p in c.fitted)]
+        found += [Coordinate("past", -6.0, 6.0, unit=self.past_N, cost=1.0)] * self._modes_begun
         if self.doubt_mm > 0:
             found.append(Coordinate("surface", -6.0, 6.0, unit=self.doubt_mm, cost=1.0))
         if self.zero_N > 0:
@@ -209,7 +212,11 @@ class Structure:
     @property
     def tail(self) -> int:
         """How many entries at the end of x belong to the run, and not to pad or causes."""
-        return (self.doubt_mm > 0) + (self.zero_N > 0)
+        return self._modes_begun + (self.doubt_mm > 0) + (self.zero_N > 0)
+
+    @property
+    def _modes_begun(self) -> int:
+        return self.pad.pad.relaxation.order if self.past_N > 0 else 0
 
     def with_cause(self, cause: Cause) -> Structure:
         """One more cause."""
@@ -247,7 +254,7 @@ class Structure:
 
     def surface_mm(self, x: Array) -> float:
         """Depth added to all positions."""
-        return float(x[len(x) - self.tail]) * self.doubt_mm if self.doubt_mm > 0 else 0.0
+        return float(x[len(x) - self.tail + self._modes_begun]) * self.doubt_mm if self.doubt_mm > 0 else 0.0
 
     def offset_N(self, x: Array) -> float:
         """What the force reads without load."""
@@ -257,7 +264,9 @@ class Structure:
         """The plant at x."""
         pad = self.pad.at(x[: len(self.pad.coordinates)])
         active = [Active(c.effect, c.form, v) for c, v in zip(self.causes, self.values(x), strict=True)]
-        return Cascade(pad, active)
+        begun = x[len(x) - self.tail :][: self._modes_begun] * self.past_N
+        past = Past(pad.relaxation.rates, tuple(begun.tolist())) if len(begun) else None
+        return Cascade(pad, active, past)
 
     @property
     def in_air(self) -> bool:

@@ -14,7 +14,7 @@ from .clocks import clocks_note
 from .estimate import NOTHING, Estimate
 from .motion import glanced, holds, turns
 from .noise import Noise
-from .past import begins_loaded
+from .past import begins_loaded, fitted_past, said_of_past
 from .problem import Problem
 from .surface import moved_mm
 
@@ -130,9 +130,9 @@ def _level_notes(
     start, begun = _first_level(m.force_N, depth), float(depth[0])
     large = max(6 * noise.force_N, 0.01 * top)
     if loaded:
-        said = f"The data begin at {begun:.3g} mm with {start:.3g} N on the pad: its past is not known, and "
         if pasts:
-            return [said + "the state it had left was fitted with it."]
+            return [fitted_past(begun, start)]
+        said = said_of_past(begun, start)
         return [said + "this method takes it as at rest: every number is off by that (`continuous` fits it)."]
     out = []
     air = depth < -0.002 * np.ptp(depth)

@@ -35,13 +35,30 @@ def with_pasts(problem: Problem, noise: Noise) -> Problem:
     return replace(problem, runs=tuple(runs)) if count else problem
 
 
+def said_of_past(depth_mm: float, force_N: float) -> str:
+    """That a run begins loaded, at a depth and with a force; what is done about it is to follow."""
+    return f"The data begin at {depth_mm:.3g} mm with {force_N:.3g} N on the pad: its past is not known, and "
+
+
+def fitted_past(depth_mm: float, force_N: float) -> str:
+    """That a run begins loaded, and the state it begins in was fitted."""
+    return said_of_past(depth_mm, force_N) + "the state it had left was fitted with it."
+
+
+def begins_inside(m: Measurement, depth_mm: float, noise_mm: float) -> bool:
+    """Whether the probe is clearly below the pad's surface from the first sample on, whatever the force is there: a pad
+    that lets go may still be on its way back to the probe."""
+    least = max(LEAST_DEPTH * depth_mm, 4 * noise_mm, 4 * m.surface_std_mm)
+    first_mm = float(np.interp(m.force_time_s[0], m.position_time_s, m.position_mm))
+    return min(first_mm, float(m.position_mm[0])) > least
+
+
 def begins_loaded(m: Measurement, depth_mm: float, force_N: float, noise: Noise) -> bool:
     """Whether the force is clear, or relaxes, while the probe is in the pad from the first sample on."""
+    if not begins_inside(m, depth_mm, noise.position_mm):
+        return False
     depth = np.interp(m.force_time_s[:HOLD], m.position_time_s, m.position_mm)
     force = m.force_N[:HOLD]
-    least = max(LEAST_DEPTH * depth_mm, 4 * noise.position_mm, 4 * m.surface_std_mm)
-    if depth[0] <= least or m.position_mm[0] <= least:
-        return False
     moved = np.abs(depth - depth[0]) > max(STILL * float(np.ptp(m.position_mm)), 6 * noise.position_mm)
     still = int(np.argmax(moved)) if moved.any() else len(depth)
     count = max(min(still, FIRST), 1)

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 
 from sim.elastic import Exponential, NoPad, Polynomial, Power
 from sim.grid import union
-from sim.pad import Cascade, Pad
+from sim.pad import Cascade, Pad, Past
 from sim.relaxation import Relaxation
 
 GEL = Relaxation((0.25, 0.15), (4.0, 0.35))
@@ -186,6 +186,25 @@ def test_union_of_random_grids() -> None:
         assert np.all(np.diff(grid) > 1e-9)
         assert np.isin(first, grid).all()
         assert np.abs(grid[index] - second).max() <= 1.5e-9
+
+
+@pytest.mark.parametrize("unilateral", [True, False])
+def test_a_run_that_begins_amid_another_goes_on_with_what_that_left(unilateral: bool) -> None:
+    """Held at a depth for T, each mode has lost F^e (1 − e^(−νT)) of what it had when it got there."""
+    held_s, depth_mm = 0.7, 0.8
+    t = np.linspace(0.0, 3.0, 600)
+    x = depth_mm + 0.7 * np.sin(2.0 * t)
+    pad = Pad(EXPONENTIAL, GEL, unilateral)
+    whole = Cascade(pad).simulate(np.append(0.0, held_s + t), np.append(depth_mm, x))[1:]
+    lost_N = EXPONENTIAL.force(np.array([depth_mm]))[0] * np.expm1(-held_s * np.array(GEL.rates))
+    past = Past(GEL.rates, tuple(lost_N.tolist()))
+    assert_allclose(Cascade(pad, (), past).simulate(t, x), whole, atol=1e-12)
+    assert np.abs(Cascade(pad).simulate(t, x) - whole).max() > 0.1
+
+
+def test_modes_between_those_of_a_past_begin_between() -> None:
+    past = Past((10.0, 0.1), (-2.0, 1.0))
+    assert_allclose(past.at([100.0, 10.0, 1.0, 0.1, 0.01]), [-2.0, -2.0, -0.5, 1.0, 1.0], atol=1e-12)
 
 
 def test_plants_of_one_cascade_do_not_share_state() -> None:
