@@ -37,7 +37,7 @@ PAD_EFFECTS = ("adhesion", "elastic_law", "stress_softening", "damage", "permane
                "depth_dependent_relaxation", "viscous_damping", "separation")  # fmt: skip
 """Names that say something of a pad; the others are of the bench."""
 
-EXAMPLE = ("pneumatic_cylinder_friction", "Circle_1bar.csv")
+EXAMPLE = ("pneumatic_cylinder_friction", "Kidney_2bar.csv")
 """The worked example."""
 
 

@@ -79,7 +79,7 @@ def _short(message: str, name: str) -> str:
 
 
 def _held(name: str, m: Measurement, plain: Model, extended: Model) -> Held:
-    """Both models from rest over the measured motion; flagged samples count for both."""
+    """Both models over the measured motion, as `bench.like` has them; flagged samples count for both."""
     counted = m.counted()
     by_plain, by_extended = (likeness(model, m).force_N for model in (plain, extended))
     position = m.position_at_forces_mm()

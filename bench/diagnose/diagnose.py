@@ -183,11 +183,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         seconds=time.perf_counter() - begun,
         model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
         notes=list(m.notes),
-        doubts=[
-            *doubts(m, search.believed.pad.pad, path.fits[0].pad),
-            *prepared.said_of_noise,
-            *_of_its_past(prepared),
-        ],
+        doubts=[*doubts(m, search.believed.pad.pad, path.fits[0].pad), *prepared.said_of_noise, *_past(search)],
         remainders=tests,
         name=m.name,
         seen_once=any(most_sure(all_effects()[c.id], c.form, search.reach.rich) < 1.0 for c in causes),
@@ -204,10 +200,10 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
     )
 
 
-def _of_its_past(prepared: Prepared) -> list[str]:
-    """That the run begins amid the pad's load, where it does."""
-    full, first = prepared.full, int(prepared.at[0])
-    begins_loaded = prepared.past_N > 0.0
+def _past(search: Search) -> list[str]:
+    """That the run begins amid the pad's load, where it does and that leaves anything."""
+    full, first = search.prepared.raw, int(search.prepared.at[0])
+    begins_loaded = search.believed.modes_begun > 0
     return [fitted_past(float(full.position_mm[first]), float(full.force_N[first]))] if begins_loaded else []
 
 

@@ -187,7 +187,7 @@ class Structure:
 
     def __post_init__(self) -> None:
         found = [*self.pad.coordinates, *(_coordinate(p) for c in self.causes for p in c.fitted)]
-        found += [Coordinate("past", -6.0, 6.0, unit=self.past_N, cost=1.0)] * self._modes_begun
+        found += [Coordinate("past", -6.0, 6.0, unit=self.past_N, cost=1.0)] * self.modes_begun
         if self.doubt_mm > 0:
             found.append(Coordinate("surface", -6.0, 6.0, unit=self.doubt_mm, cost=1.0))
         if self.zero_N > 0:
@@ -212,10 +212,11 @@ class Structure:
     @property
     def tail(self) -> int:
         """How many entries at the end of x belong to the run, and not to pad or causes."""
-        return self._modes_begun + (self.doubt_mm > 0) + (self.zero_N > 0)
+        return self.modes_begun + (self.doubt_mm > 0) + (self.zero_N > 0)
 
     @property
-    def _modes_begun(self) -> int:
+    def modes_begun(self) -> int:
+        """How many modes begin with what their past has left."""
         return self.pad.pad.relaxation.order if self.past_N > 0 else 0
 
     def with_cause(self, cause: Cause) -> Structure:
@@ -254,7 +255,7 @@ class Structure:
 
     def surface_mm(self, x: Array) -> float:
         """Depth added to all positions."""
-        return float(x[len(x) - self.tail + self._modes_begun]) * self.doubt_mm if self.doubt_mm > 0 else 0.0
+        return float(x[len(x) - self.tail + self.modes_begun]) * self.doubt_mm if self.doubt_mm > 0 else 0.0
 
     def offset_N(self, x: Array) -> float:
         """What the force reads without load."""
@@ -264,7 +265,7 @@ class Structure:
         """The plant at x."""
         pad = self.pad.at(x[: len(self.pad.coordinates)])
         active = [Active(c.effect, c.form, v) for c, v in zip(self.causes, self.values(x), strict=True)]
-        begun = x[len(x) - self.tail :][: self._modes_begun] * self.past_N
+        begun = x[len(x) - self.tail :][: self.modes_begun] * self.past_N
         past = Past(pad.relaxation.rates, tuple(begun.tolist())) if len(begun) else None
         return Cascade(pad, active, past)
 

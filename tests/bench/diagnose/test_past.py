@@ -49,6 +49,15 @@ def test_a_cause_is_found_beside_what_the_past_has_left(seed):
     assert d.causes[0].parameters["coulomb"].value == pytest.approx(c.truth.parameters["friction"]["coulomb"], rel=0.1)
 
 
+def test_without_a_pad_there_is_no_past():
+    """A bench in air that stands below where the surface would be."""
+    t = np.arange(0.0, 8.0, 0.01)
+    x = 2.0 + np.interp(t, [1.0, 2.0, 4.0, 5.0], [0.0, 1.0, 1.0, -1.0])
+    m = Measurement("air", t, x, t, np.random.default_rng(1).normal(0.0, 0.01, t.size))
+    d = diagnose(m, Model.from_dict({"pad": {"elastic": {"law": "none"}}}))
+    assert d.verdict == "consistent" and not d.doubts
+
+
 def test_a_run_that_begins_in_air_begins_at_rest():
     _, m, d = begun_late(1, (), 0.0)
     assert not any("its past is not known" in said for said in d.doubts)
