@@ -152,7 +152,7 @@ def _along(
     inside = begins_inside(measurement, float(position_mm.max()), noise_of([measurement]).position_mm)
     if inside and model.pad.relaxation.rates:
         rates = tuple(model.pad.relaxation.rates)
-        past = _past(lambda past: simulated_from(past)[at][counted], measured, rates)
+        past = _past(lambda past: simulated_from(past)[at][counted], measured, rates, float(np.ptp(time_s)))
 
     def force(moved_mm: float) -> Array:
         simulated = simulated_from(past, moved_mm)
@@ -171,13 +171,13 @@ def _along(
     return replace(_of(measurement, force(moved_mm), moved_mm, flagged), begins_inside=past is not None)
 
 
-def _past(simulated_N: Callable[[Past], Array], measured_N: Array, rates: tuple[float, ...]) -> Past:
+def _past(simulated_N: Callable[[Past], Array], measured_N: Array, rates: tuple[float, ...], run_s: float) -> Past:
     """What modes of these rates begin with so that the force is nearest to the measured one (n,). Forces as large as
     the greatest are as likely as none, as in a diagnosis."""
     unit, V = max(float(np.abs(measured_N).max(initial=0.0)), 1e-6), 0.0
 
     def begun(left: Array) -> Past:
-        return Past(rates, tuple((unit * left).tolist()))
+        return Past(rates, tuple((unit * left).tolist()), run_s)
 
     def error(left: Array) -> Array:
         return np.append(measured_N - simulated_N(begun(left)), math.sqrt(V) * left)

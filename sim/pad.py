@@ -5,6 +5,7 @@ Both forms run the same compiled step (sim/kernel.py) on the same layout, so the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -46,18 +47,20 @@ class Pad:
 @dataclass(frozen=True)
 class Past:
     """What is left of the time before the first sample in modes of some rates, in 1/s: forces beyond those of a pad
-    just pressed, N, that fade as c_i · left_i e^(−ν_i t). Modes of other rates have what stands between."""
+    just pressed, N, that fade as c_i · left_i e^(−ν_i t). Modes of other rates have what stands between. Of what does
+    not fade within a run of `run_s` nothing is said: it is a force that is always there."""
 
     rates: tuple[float, ...]
     left_N: tuple[float, ...]
+    run_s: float = math.inf
 
     def at(self, rates: Sequence[float]) -> Array:
-        """Forces left in modes (r,), N; none of which a pad without relaxation has."""
+        """Forces left in modes (r,), N, as far as they fade; none of which a pad without relaxation has."""
         if not self.rates:
             return np.zeros(len(rates))
-        order = np.argsort(self.rates)
-        known = np.log(np.array(self.rates)[order])
-        return np.asarray(np.interp(np.log(np.array(rates)), known, np.array(self.left_N)[order]))
+        order, asked = np.argsort(self.rates), np.array(rates)
+        left = np.interp(np.log(asked), np.log(np.array(self.rates)[order]), np.array(self.left_N)[order])
+        return np.asarray(-left * np.expm1(-asked * self.run_s))
 
 
 class Cascade:

@@ -110,7 +110,8 @@ def believed_structure(model: Model, prepared: Prepared) -> Structure:
             continue
         active = entry.active()
         causes.append(cause_of(active.effect, active.form, active.values))
-    return Structure(pad, tuple(causes), prepared.doubt_mm, prepared.zero_N, prepared.past_N)
+    run_s = float(np.ptp(prepared.full.time_s))
+    return Structure(pad, tuple(causes), prepared.doubt_mm, prepared.zero_N, prepared.past_N, run_s)
 
 
 def _pads(m: Measurement, believed: Model, structure: Structure, good: Mask) -> list[Array]:

@@ -6,6 +6,7 @@ that they never add up to more than 1.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -174,8 +175,8 @@ class Structure:
     """A pad with effects, to be fitted: x = [pad, effects in order, past, surface, zero].
 
     `doubt_mm`, `zero_N`: standard deviations of the surface and of the force's zero, as touch-off and tare found them;
-    0: certain, and no entry of x. `past_N`: that of what each of the pad's modes begins with, where the run begins in
-    contact (`sim.pad.Past`); 0: it begins at rest.
+    0: certain, and no entry of x. `past_N`: that of what each of the pad's modes begins with, where the run of `run_s`
+    begins in contact (`sim.pad.Past`); 0: it begins at rest.
     """
 
     pad: PadNumbers
@@ -183,6 +184,7 @@ class Structure:
     doubt_mm: float = 0.0
     zero_N: float = 0.0
     past_N: float = 0.0
+    run_s: float = math.inf
     coordinates: tuple[Coordinate, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -266,7 +268,7 @@ class Structure:
         pad = self.pad.at(x[: len(self.pad.coordinates)])
         active = [Active(c.effect, c.form, v) for c, v in zip(self.causes, self.values(x), strict=True)]
         begun = x[len(x) - self.tail :][: self.modes_begun] * self.past_N
-        past = Past(pad.relaxation.rates, tuple(begun.tolist())) if len(begun) else None
+        past = Past(pad.relaxation.rates, tuple(begun.tolist()), self.run_s) if len(begun) else None
         return Cascade(pad, active, past)
 
     @property

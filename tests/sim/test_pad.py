@@ -207,6 +207,11 @@ def test_modes_between_those_of_a_past_begin_between() -> None:
     assert_allclose(past.at([100.0, 10.0, 1.0, 0.1, 0.01]), [-2.0, -2.0, -0.5, 1.0, 1.0], atol=1e-12)
 
 
+def test_what_does_not_fade_within_a_run_is_no_past() -> None:
+    past = Past((10.0, 0.1), (-2.0, 1.0), run_s=20.0)
+    assert_allclose(past.at([10.0, 0.1, 1e-5]), [-2.0, -np.expm1(-2.0), 2e-4], rtol=1e-3)
+
+
 def test_plants_of_one_cascade_do_not_share_state() -> None:
     cascade = Cascade(Pad(EXPONENTIAL, GEL, unilateral=True))
     one = cascade.plant()
