@@ -127,7 +127,7 @@ class Search(Shaping):
     def _walked(self, path: Path, begun: int) -> Path:
         """A path carried on, cause by cause, until none pays or the work is too much. `begun`: where it was then."""
         asked = 1  # fits on the path when the causes' shapes were last asked
-        turned_at = self.work
+        turned_at, reshaped = self.work, False
         while len(path.fits) <= MOST_CAUSES:
             now = self.work
             # a third cause is not begun where it would not be done with what is left: most often there is none
@@ -146,12 +146,15 @@ class Search(Shaping):
             asked = len(path.fits) if again else asked
             other = self._another_shape(path, turn, again)
             if other is not None:  # not a further cause, but one found of another shape
-                path.fits[-1] = other
+                path.fits[-1], reshaped = other, True
                 continue
             self._told_at_full_rate(path, turn)
             self._note(path, turn)
             if turn.of_a_shape or not self._added(path, turn):
                 break
+            reshaped = False
+        if reshaped and len(path.fits) > 2:  # what came in beside a cause in another shape may be another's work
+            path.fits[-1] = self.exchanged(path)
         return path
 
     def _much_left(self, path: Path) -> bool:

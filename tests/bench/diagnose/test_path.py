@@ -180,6 +180,18 @@ def test_another_shape_of_the_first_is_taken_before_it_is_said_that_no_second_pa
     assert named(Told(ranks, None, {20e3: 19e3})) == ["cogging"]  # of what is left a twentieth is no shape
 
 
+def test_where_the_last_cause_has_another_shape_those_before_it_are_held_against_others_again():
+    """A ripple came in where a bias and a resonance were, and leaves no more than they do once that has its shape."""
+    ranks: Any = {
+        (): {"cogging": 20e3},
+        ("cogging",): {"resonance": 3000.0},
+        ("cogging", "resonance", 2900.0): {"friction": 1900.0},
+    }
+    search = Told(ranks, fit(2900.0, "cogging", "resonance"), {2900.0: 1010.0})
+    assert named(search) == ["cogging", "resonance"]
+    assert search.exchanges == 2, "as it came in, and in its shape"
+
+
 class Counting(Told):
     """A search that counts its turns."""
 
