@@ -112,7 +112,8 @@ def likeness(model: Model, measurement: Measurement) -> Likeness:
     sized(measurement)
     alone = faults(measurement.force_N)
     flagged = ~alone.good
-    found = [_along(model, measurement, *path, flagged) for path in _paths(measurement)]
+    pressed = begins_inside(measurement, float(measurement.position_mm.max()), noise_of([measurement]).position_mm)
+    found = [_along(model, measurement, *path, flagged, pressed) for path in _paths(measurement)]
     best = found[-1] if found[-1].rmse_N < (1.0 - CLEARLY) * found[0].rmse_N else found[0]
     flagged = _spoiled(measurement, best.force_N, best.rmse_N, alone)
     judged = replace(_of(measurement, best.force_N, best.moved_mm, flagged), begins_inside=best.begins_inside)
@@ -133,9 +134,16 @@ def _paths(measurement: Measurement) -> Iterator[tuple[Array, Array, Array]]:
 
 
 def _along(
-    model: Model, measurement: Measurement, time_s: Array, position_mm: Array, stamp_s: Array, flagged: Mask
+    model: Model,
+    measurement: Measurement,
+    time_s: Array,
+    position_mm: Array,
+    stamp_s: Array,
+    flagged: Mask,
+    pressed: bool,
 ) -> Likeness:
-    """On one path, the surface where it serves the model best. `stamp_s` (m,): of the forces."""
+    """On one path, the surface where it serves the model best. `stamp_s` (m,): of the forces. `pressed`: whether it
+    begins in the pad, in a state that is found too."""
     counted = measurement.counted() & ~flagged
     measured = measurement.force_N[counted]
 
@@ -144,19 +152,20 @@ def _along(
     if not tared.any():
         stamps_s, at = stamp_s, np.arange(stamp_s.size)
 
-    def simulated_from(past: Past | None, moved_mm: float = 0.0) -> Array:
-        plant = Cascade(model.pad.physics(), model.cascade.effects, past)
+    def simulated(plant: Cascade, moved_mm: float = 0.0) -> Array:
         return plant.simulate_at(time_s, position_mm + moved_mm, stamps_s)
 
-    past = None
-    inside = begins_inside(measurement, float(position_mm.max()), noise_of([measurement]).position_mm)
-    if inside and model.pad.relaxation.rates:
+    def after(past: Past) -> Cascade:
+        return Cascade(model.pad.physics(), model.cascade.effects, past)
+
+    plant = model.cascade
+    if pressed and model.pad.relaxation.rates:
         rates = tuple(model.pad.relaxation.rates)
-        past = _past(lambda past: simulated_from(past)[at][counted], measured, rates, float(np.ptp(time_s)))
+        plant = after(_past(lambda past: simulated(after(past))[at][counted], measured, rates, float(np.ptp(time_s))))
 
     def force(moved_mm: float) -> Array:
-        simulated = simulated_from(past, moved_mm)
-        own = simulated[at] - float(np.mean(simulated[tared])) if tared.any() else simulated
+        whole = simulated(plant, moved_mm)
+        own = whole[at] - float(np.mean(whole[tared])) if tared.any() else whole
         return own + _zero_N(measured - own[counted], measurement.zero_std_N)
 
     def square(moved_mm: float) -> float:
@@ -168,7 +177,7 @@ def _along(
         moved_mm = _least(square, std)
         V = square(moved_mm) / measured.size
         moved_mm = _least(lambda s: square(s) + V * (s / std) ** 2, std)
-    return replace(_of(measurement, force(moved_mm), moved_mm, flagged), begins_inside=past is not None)
+    return replace(_of(measurement, force(moved_mm), moved_mm, flagged), begins_inside=plant is not model.cascade)
 
 
 def _past(simulated_N: Callable[[Past], Array], measured_N: Array, rates: tuple[float, ...], run_s: float) -> Past:

@@ -110,8 +110,9 @@ def believed_structure(model: Model, prepared: Prepared) -> Structure:
             continue
         active = entry.active()
         causes.append(cause_of(active.effect, active.form, active.values))
+    past_N = prepared.force_scale_N if prepared.pressed else 0.0
     run_s = float(np.ptp(prepared.full.time_s))
-    return Structure(pad, tuple(causes), prepared.doubt_mm, prepared.zero_N, prepared.past_N, run_s)
+    return Structure(pad, tuple(causes), prepared.doubt_mm, prepared.zero_N, past_N, run_s)
 
 
 def _pads(m: Measurement, believed: Model, structure: Structure, good: Mask) -> list[Array]:
@@ -203,9 +204,10 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
 
 def _past(search: Search) -> list[str]:
     """That the run begins amid the pad's load, where it does and that leaves anything."""
+    if not search.believed.modes_begun:
+        return []
     full, first = search.prepared.raw, int(search.prepared.at[0])
-    begins_loaded = search.believed.modes_begun > 0
-    return [fitted_past(float(full.position_mm[first]), float(full.force_N[first]))] if begins_loaded else []
+    return [fitted_past(float(full.position_mm[first]), float(full.force_N[first]))]
 
 
 def _swinging(prepared: Prepared, residual_N: Array) -> Swing | None:

@@ -299,10 +299,11 @@ class Sieve:
             x = structure.x(pad, [*before, cause.start], root.fit.of_run)
             begun = self._solved(structure, x, FEW, None)
             own = self._of_its_own(fit, form, trials, found, known)
-            further = own is not None and (begun is None or own.score < begun.score)
-            if own is not None and further:
+            if own is not None and begun is not None and begun.score <= own.score:
+                own = None
+            if own is not None:
                 out.append(self._falling(own))
-            if begun is not None and (dealt is not None or not further):
+            if begun is not None and (own is None or dealt is not None):
                 out.append(self._carried(begun, MORE))
         return sorted(out, key=lambda t: t.score)
 
