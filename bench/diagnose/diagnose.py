@@ -23,7 +23,7 @@ from .candidates import CHANNEL
 from .channel import FEW, Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, joined
 from .data import Prepared, prepare
-from .evidence import SPEAKS, beyond_limit
+from .evidence import SPEAKS, beyond_limit, held_back
 from .needed import Needed, needed
 from .noise import SETTLED_S
 from .noiseless import without_noise
@@ -166,6 +166,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
     floor = min(float(np.sqrt(prepared.floor_N**2 - prepared.felt_floor_N**2)), floor)
     saturated = flags.saturated.copy()
     saturated[prepared.kept] |= beyond_limit(raw, whole[1])[at]
+    saturated[prepared.kept] |= held_back(prepared, whole[1], flags)
     flags = replace(flags, saturated=saturated)
     if flags.outlier.sum() < FEW and all(c.id != "outliers" for c in causes):  # left out, but no fault of the channel
         flags = replace(flags, outlier=np.zeros_like(flags.outlier))

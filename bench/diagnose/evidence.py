@@ -12,7 +12,7 @@ from scipy.stats import chi2 as chi2_law
 
 from sim.effects.base import Parameter
 
-from .channel import FAR
+from .channel import FAR, Faults
 from .data import Data, Prepared
 from .numbers import Cause
 from .refit import Fit, errors, force_at, reduced
@@ -30,6 +30,8 @@ FEWEST = 3  # samples at fault that are called a fault
 FURTHER = 50.0  # Δχ² that a further cause takes at the least: less is hardly to be seen beside the first
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 TRACE = 2e-4  # the same, of one that takes most of what a far larger one leaves: no shape is so exact
+SHORT = 5.0  # deviations that a sample at a ceiling reads less than the force at the least
+HIGH, RIGHT = 0.8, 1.5  # of the least force of a ceiling, that is near it; deviations of what a model leaves there
 
 SLOW, KNOTS = ("force_bias", "force_drift"), 24  # causes that are a force of time alone; and the pieces of its course
 
@@ -217,5 +219,23 @@ def beyond_limit(data: Data, fit: Fit) -> Mask:
         return np.zeros(data.size, dtype=bool)
     limit_N = fit.structure.values(fit.x)[index]["limit"]
     force = force_at(data, *reduced(fit, index))
-    one_sided = fit.structure.causes[index].form.name in ("upper", "stop")
+    one_sided = fit.structure.causes[index].form.name in ("upper", "stop", "folding")
     return np.asarray((force if one_sided else np.abs(force)) > limit_N)
+
+
+def held_back(prepared: Prepared, fit: Fit, flags: Faults) -> Mask:
+    """Of each force sample kept (m,), whether it reads less than the force where samples with as much are saturated: a
+    ceiling that is not level shows by itself in some of them, and in the rest once there is a force to hold them
+    against. None where the fit has a ceiling itself, or is not right about the greatest forces below it."""
+    saturated, at = flags.saturated[prepared.kept], prepared.at
+    none = np.zeros_like(saturated)
+    if not saturated.any() or any(c.id == "saturation" for c in fit.structure.causes):
+        return none
+    sign = np.sign(np.mean(prepared.raw.force_N[at][saturated]))
+    force = sign * force_at(prepared.raw, fit.structure, fit.x)[at]
+    short = (force - sign * prepared.raw.force_N[at]) / prepared.full.total_N[at]
+    least = float(np.median(sign * prepared.raw.force_N[at][saturated]))
+    found = (force > least) & (short > SHORT) & ~flags.flagged[prepared.kept]
+    beside = (force > HIGH * least) & (prepared.raw.weight[at] > 0) & ~found
+    right = beside.any() and float(np.mean(short[beside] ** 2)) < RIGHT**2
+    return found if right else none

@@ -4,6 +4,8 @@
 - `upper`: at +limit alone.
 - `stop`: beyond +limit an overload stop bears beside the cell, which feels a share of what is more, as the stiffnesses
   of both have it.
+- `folding`: beyond +limit the output falls again, by a share of what is more: an output stage that limits its current
+  the more, the more it is overloaded (foldback).
 - `recovering`: at +limit for a time after the force has come back below it too: an amplifier that was driven into its
   rail takes a while to leave it (its overload recovery time).
 - `compressing`: beyond ±limit by the logarithm of what is more, limit + reach ln(1 + (|u| − limit)/reach): diodes that
@@ -38,6 +40,12 @@ def upper(dt: float, force: float, state: State, p: State) -> float:
 def stop(dt: float, force: float, state: State, p: State) -> float:
     """A share of what is beyond +limit; p = (limit, passes)."""
     return force if force <= p[0] else p[0] + p[1] * (force - p[0])
+
+
+@block
+def folding(dt: float, force: float, state: State, p: State) -> float:
+    """Down again by a share of what is beyond +limit; p = (limit, falls)."""
+    return force if force <= p[0] else p[0] - p[1] * (force - p[0])
 
 
 @block
@@ -95,6 +103,16 @@ EFFECT = Effect(
             ),
             sought=False,
             blocks={"sampling": stop},
+        ),
+        Form(
+            name="folding",
+            what="in compression, where the output falls again",
+            parameters=(
+                _LIMIT,
+                Parameter("falls", "1", 0.0, 0.5, 0.1, "share of what is beyond by which it falls"),
+            ),
+            sought=False,
+            blocks={"sampling": folding},
         ),
         Form(
             name="recovering",
