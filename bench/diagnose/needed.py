@@ -75,7 +75,7 @@ def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple
         if len(fits) < 2:
             return None
         slow = _slow_squares(prepared, fits, squares)
-        number = _needless(prepared, fits, squares, excess, apart, slow)
+        number = _needless(prepared, fits, squares, excess, apart, slow, path)
         return _doubtful(path, fits, excess, apart, floor_N, slow) if number is None else number
 
     fits = chain(prepared, final, base, path.fits)
@@ -121,8 +121,9 @@ def _slow_squares(prepared: Prepared, fits: list[Fit], squares: list[float]) -> 
 
 
 def _needless(
-    prepared: Prepared, fits: list[Fit], squares: list[float], excess: list[float], apart: float, slow: list[float]
-) -> int | None:
+    prepared: Prepared, fits: list[Fit], squares: list[float], excess: list[float], apart: float, slow: list[float],
+    path: Path,
+) -> int | None:  # fmt: skip
     """Number of a cause that is of no use for what was held out, or does harm to what comes later; None: all are."""
     own = len(fits[0].structure.causes)
     floor = squares[-1] - excess[-1]
@@ -143,9 +144,11 @@ def _needless(
         most_left = k < 2 and gain >= MOST_LEFT * (left - slow[k]) and gain >= SPEAKS * prepared.floor_N**2
         if small and not most_left:
             return k
-    if later_square(prepared, fits[0]) > UNTOLD * squares[0]:  # what comes early does not tell the pad itself
-        return None
     later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
+    plain = later_square(prepared, fits[0])
+    if plain > UNTOLD * squares[0]:  # what comes early does not tell the pad itself, nor any cause that helps with that
+        doubted = min(range(last + 1), key=lambda k: _sure(path, fits, k))
+        return doubted if later > plain and _sure(path, fits, doubted) < DOUBTED else None
     if all(later <= HARM * later_square(prepared, fit) for fit in fits[:-1]):
         return None
     # a drift that turns or ends is one, though its begin does not foretell that; nor does half of a course the rest
@@ -175,11 +178,9 @@ def _doubtful(
     now less in time, which may follow what the others' shapes miss wherever it stands. `apart`: what a channel's faults
     take (N²); where that is most, the first cause beside them is a further one too."""
     causes = fits[-1].structure.causes[len(fits[0].structure.causes) :]
-    named = [c.id for c in causes]
     whole = excess[0] + apart
     for k in range(len(fits) - 1, 0 if apart > excess[0] else 1, -1):
-        _, confidence, kind = sureness(path, named[k - 1], named)
-        sure = max(confidence, kind)
+        sure = _sure(path, fits, k - 1)
         taken, trace = excess[k - 1] - excess[k], TRACE * excess[0]
         nearly_all = taken + excess[-1] < 2.0 * trace
         if causes[k - 1].form.has_a_course and taken < trace and nearly_all:
@@ -195,6 +196,13 @@ def _doubtful(
         if sure < DOUBTED and taken < min(OF_A_GIANT * excess[0], NO_LESS * excess[-1]):
             return k - 1
     return None
+
+
+def _sure(path: Path, fits: list[Fit], number: int) -> float:
+    """How sure one of the causes found is, by its name or by its kind."""
+    named = [c.id for c in fits[-1].structure.causes[len(fits[0].structure.causes) :]]
+    _, confidence, kind = sureness(path, named[number], named)
+    return max(confidence, kind)
 
 
 def _flagged_square(prepared: Prepared, fit: Fit) -> float:

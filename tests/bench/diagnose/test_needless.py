@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose import verdict
+from bench.diagnose.path import Path
 from bench.diagnose.refit import chi2
 from bench.diagnose.verdict import no_size
 from tests.bench.diagnose.small import fitted
@@ -26,10 +27,11 @@ def needless(
     ids: Sequence[str] = ("friction", "backlash", "inertia"),
     later: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
     course: bool = False,
+    sure: float = 1.0,
 ) -> int | None:
     """Number of the needless cause: `squares`, with none, one … all causes; `left_out`, without each but the last.
-    `later`: squares of what comes later, by the number of causes; `course`: they have one in time. The noise's own
-    square is 1."""
+    `later`: squares of what comes later, by the number of causes; `course`: they have one in time; `sure`: so are
+    their names. The noise's own square is 1."""
     causes = tuple(SimpleNamespace(id=i, form=SimpleNamespace(has_a_course=course)) for i in ids)
     fits: list[Any] = [
         SimpleNamespace(structure=SimpleNamespace(causes=causes[:k]), number=k) for k in range(len(squares))
@@ -41,9 +43,10 @@ def needless(
         return later[fit] if isinstance(fit, int) else later[fit.number]
 
     monkeypatch.setattr(module, "later_square", later_square)
+    monkeypatch.setattr(module, "_sure", lambda path, fits, number: sure)
     prepared: Any = SimpleNamespace(floor_N=1.0, floor_square_std=0.01)
     return module._needless(
-        prepared, fits, list(squares), [max(s - 1.0, 0.0) for s in squares], 0.0, [0.0] * len(squares)
+        prepared, fits, list(squares), [max(s - 1.0, 0.0) for s in squares], 0.0, [0.0] * len(squares), Path([])
     )
 
 
@@ -89,6 +92,11 @@ def test_an_end_that_the_belief_cannot_foretell_judges_no_cause(monkeypatch):
     """With more than twice the square it leaves elsewhere the early part does not tell the pad itself."""
     assert needless(monkeypatch, [4.0, 2.0], [], later=[7.0, 40.0]) == 0
     assert needless(monkeypatch, [4.0, 2.0], [], later=[9.0, 40.0]) is None
+
+
+def test_a_doubtful_name_that_foretells_that_end_no_better_goes(monkeypatch):
+    for later, sure, gone in ((9.5, 0.2, 0), (8.5, 0.2, None), (9.5, 0.4, None)):
+        assert needless(monkeypatch, [4.0, 2.0], [], ["force_drift"], [9.0, later], sure=sure) == gone
 
 
 @pytest.mark.parametrize(("after", "gone"), [((-2e-5, 0.05), 0), ((-4e-4, 0.05), None), ((-4e-4, 0.001), 1)])
