@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 PERIODS = 36
 TURNS = 24  # parts of a period
 APART = 1.2  # times the waves of one sine, that a second one has at the least: else they are one that swells
+BEAT = 0.25  # of a beat over the travel: two waves with less between them are one, whatever their periods
 RATIO = 2.5  # of the second sine to the first at the most, to start with
 
 Column = Callable[[float, float], Array]
@@ -41,11 +42,31 @@ def two_periods(form: Form) -> bool:
 
 
 def merged(form: Form, values: Mapping[str, float], travel_mm: float) -> bool:
-    """Whether two waves of a form are hardly apart, and less than a beat over the travel: they are one that swells, and
-    their sizes tell of each other alone."""
-    if not two_periods(form) or not 1.0 / APART < values["order"] < APART:
+    """Whether two waves of a form are hardly apart, and less than a beat over the travel; or apart by a small part of a
+    beat: they are one that swells, and their sizes tell of each other alone."""
+    if not two_periods(form):
         return False
-    return abs(values["order"] - 1.0) * travel_mm < values["period"]
+    beats = abs(values["order"] - 1.0) * travel_mm / values["period"]
+    return beats < (1.0 if 1.0 / APART < values["order"] < APART else BEAT)
+
+
+def larger_first(form: Form, values: Mapping[str, float]) -> dict[str, float] | None:
+    """The same two waves with the larger for the first, whose size and period are told; None where it is, or where the
+    other would then have more waves for each of it than the form allows."""
+    if not two_periods(form) or values["ratio"] <= 1.0:
+        return None
+    limits = next(p for p in form.parameters if p.name == "order")
+    if not limits.lower <= 1.0 / values["order"] <= limits.upper:
+        return None
+    phases = {"phase": values["second_phase"], "second_phase": values["phase"]}
+    return {
+        **values,
+        "amplitude": values["amplitude"] * values["ratio"],
+        "period": values["period"] / values["order"],
+        "ratio": 1.0 / values["ratio"],
+        "order": 1.0 / values["order"],
+        **{name: float(np.mod(value, 2.0 * np.pi)) for name, value in phases.items()},
+    }
 
 
 def turned(cause: Cause) -> list[Cause]:

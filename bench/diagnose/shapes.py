@@ -18,7 +18,7 @@ from .modes import as_believed, missing_told
 from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
 from .refit import Fit, chi2, reduced, refit
-from .ripple import merged, ripples
+from .ripple import larger_first, merged, ripples
 from .way import met_again
 
 Array = NDArray[np.float64]
@@ -128,6 +128,7 @@ def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
                 taken = other
                 break
         taken = _longer(short, _apart(short, taken, index, members[1:count]), index)
+        taken = _exchanged(short, taken, index)
     return fit if taken is lead else taken
 
 
@@ -182,6 +183,17 @@ def _longer(short: Data, fit: Fit, index: int) -> Fit:
         found += [refit(short, f.structure, f.x, END, 1e-8) for f in tried[: LONGER // 2]]
     members = [Member(fit, index), *(Member(f, index) for f in found if not departed(short, f, index))]
     return members[int(np.argmin(scores(short, members)))].fit
+
+
+def _exchanged(short: Data, fit: Fit, index: int) -> Fit:
+    """The fit with the larger of a cause's two waves for the first."""
+    cause, end = fit.structure.causes[index], len(fit.structure.pad.coordinates)
+    values = larger_first(cause.form, fit.structure.values(fit.x)[index])
+    if values is None:
+        return fit
+    form = with_periods(cause.form, 0.5 * values["period"], 2.0 * values["period"])
+    own = cause_of(cause.effect, form, values)
+    return refit(short, *_in_place(fit, index, own, fit.x[:end]), END, 1e-8)
 
 
 def _in_place(fit: Fit, index: int, cause: Cause, pad: Array) -> tuple[Structure, Array]:

@@ -68,7 +68,8 @@ def test_two_ripples_begin_near_their_periods_the_greater_first(id_, seed, great
 
 
 @pytest.mark.parametrize(
-    ("order", "period_mm", "one"), [(1.1, 2.0, True), (0.9, 2.0, True), (1.1, 0.2, False), (1.4, 2.0, False)]
+    ("order", "period_mm", "one"),
+    [(1.1, 2.0, True), (0.9, 2.0, True), (1.1, 0.2, False), (1.4, 2.0, False), (1.4, 5.0, True)],
 )
 def test_two_waves_of_less_than_a_beat_are_one_that_swells(order: float, period_mm: float, one: bool) -> None:
     values = {"period": period_mm, "order": order}
@@ -148,3 +149,20 @@ def test_a_ripple_begun_elsewhere_is_the_same_one_moved():
     far = wave({**known.start, "phase": 0.4 + k * moved_mm, "second_phase": 1.1 + 2 * k * moved_mm})
     nearest = min(float(np.abs(wave(cause.start) - far).max()) for cause in ripple.turned(known))
     assert nearest < 0.5 * 2 * np.pi / ripple.TURNS * 2.0 < float(np.abs(wave(known.start) - far).max())
+
+
+def test_of_two_waves_the_larger_is_told_as_the_first():
+    """The same force at every place; and nothing is done where it is already, or the other would be out of bounds."""
+    form = effect("cogging").form("two_periods")
+    values = {"amplitude": 0.02, "period": 0.7, "phase": 0.4, "ratio": 2.5, "order": 0.51, "second_phase": -1.0}
+    told = ripple.larger_first(form, values)
+    assert told is not None and told["amplitude"] == pytest.approx(0.05) and told["period"] == pytest.approx(0.7 / 0.51)
+
+    def force(p):
+        angle = 2 * np.pi * np.linspace(-3.0, 3.0, 50) / p["period"]
+        second = p["ratio"] * np.sin(p["order"] * angle + p["second_phase"])
+        return p["amplitude"] * (np.sin(angle + p["phase"]) + second)
+
+    np.testing.assert_allclose(force(told), force(values), atol=1e-12)
+    assert ripple.larger_first(form, told) is None
+    assert ripple.larger_first(form, values | {"order": 0.25 / 1.01}) is None
