@@ -22,6 +22,8 @@ from sim.relaxation import Relaxation
 
 Array = NDArray[np.float64]
 
+STEEPEST = 25.0  # of an exponential law over the depth: beyond, a pad is none but at the very end
+
 
 @dataclass(frozen=True)
 class Coordinate:
@@ -74,7 +76,7 @@ class PadNumbers:
     def _law(self) -> list[Coordinate]:
         law, D, F = self.pad.law, self.depth_mm, self.force_N
         if isinstance(law, Exponential):
-            return [_positive("m"), Coordinate("b", -25.0, 60.0, unit=1 / D)]
+            return [_positive("m"), Coordinate("b", -STEEPEST, STEEPEST, unit=1 / D)]
         if isinstance(law, Power):
             return [_positive("p"), Coordinate("q", -0.95, 30.0)]
         if isinstance(law, Polynomial):

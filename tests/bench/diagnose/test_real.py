@@ -55,6 +55,20 @@ def test_the_worked_example_finds_the_friction_of_its_strokes(example: Outcome) 
 
 @measured
 @pytest.mark.long
+def test_friction_is_found_where_the_law_that_fits_best_alone_is_one_that_no_pad_has() -> None:
+    """The fit of a pad to a cylinder has e^60 over its way; from there no fit of a cause finds its way back."""
+    found = of("pneumatic_cylinder_friction", "O-ring_3bar.csv")
+    assert found.diagnosis is not None
+    first, (held,) = found.diagnosis.causes[0], found.held
+    assert first.id == "friction" and first.confidence > 0.7
+    assert held.extended_N < 0.5 * held.force_N[held.counted].std()
+    speed = np.gradient(held.position_mm, held.time_s)
+    half = 0.5 * (np.median(held.force_N[speed > 0.3]) - np.median(held.force_N[speed < -0.3]))
+    assert first.parameters["coulomb"].value == pytest.approx(half, rel=0.2)
+
+
+@measured
+@pytest.mark.long
 def test_an_axis_is_given_the_names_of_a_bench() -> None:
     found = of("emps_linear_axis", "emps_train.csv")
     assert found.diagnosis is not None
