@@ -29,7 +29,7 @@ RIVAL = 25.0  # Δχ², rescaled by what is left: less excludes no rival
 FEWEST = 3  # samples at fault that are called a fault
 FURTHER = 50.0  # Δχ² that a further cause takes at the least: less is hardly to be seen beside the first
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
-TRACE = 2e-4  # the same, of one that takes most of what a far larger one leaves: no shape is so exact
+EXACT = 2e-4  # the same, of one that takes most of what a far larger one leaves: no shape is so exact
 SHORT = 5.0  # deviations that a sample at a ceiling reads less than the force at the least
 HIGH, RIGHT = 0.8, 1.5  # of the least force of a ceiling, that is near it; deviations of what a model leaves there
 
@@ -70,7 +70,7 @@ class Evidence:
         if self.share >= SHARE:
             return True
         # a small one beside a giant; but a third that is small has two inexact shapes to be the rest of
-        return self.known == 1 and self.share >= TRACE and self.of_left >= MOST_LEFT and self.crumb >= SPEAKS
+        return self.known == 1 and self.share >= EXACT and self.of_left >= MOST_LEFT and self.crumb >= SPEAKS
 
 
 def threshold(freedom: int) -> float:

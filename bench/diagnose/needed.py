@@ -10,7 +10,7 @@ import numpy as np
 
 from .channel_causes import hum_cause
 from .data import Data, Prepared
-from .evidence import MOST_LEFT, SPEAKS, of_slow_force, within_bounds
+from .evidence import EXACT, MOST_LEFT, SPEAKS, of_slow_force, within_bounds
 from .gauge import gauged
 from .held_out import SEEN, held_out_square, later_square
 from .hum import Line
@@ -81,15 +81,19 @@ def _needed(prepared: Prepared, path: Path, final: Fit, floor_N: float) -> tuple
     fits = chain(prepared, final, base, path.fits)
     squares, excess = excesses(prepared, fits, floor_N)
     number = needless(fits, squares, excess)
+    milder = None
     if number is not None:  # it may be the shape that does harm, and not the cause
         for other in _milder(prepared, path, final):
             again = chain(prepared, ordered(prepared, other, base), base, path.fits)
             of_them = excesses(prepared, again, floor_N)
             if needless(again, *of_them) is None:
-                return again, *of_them
+                milder = again, *of_them
+                break
     while number is not None:
         fits, squares, excess = _dropped(prepared, path, fits, number, floor_N)
         number = needless(fits, squares, excess)
+        if milder is not None and (number is not None or milder[1][-1] <= squares[-1]):
+            return milder  # and not where without the cause what was held out is met better than with a worse shape
     return fits, squares, excess
 
 
@@ -142,6 +146,7 @@ def _needless(
             return k
         small = gain <= (LEAST if last == 0 else FURTHER) * scale
         most_left = k < 2 and gain >= MOST_LEFT * (left - slow[k]) and gain >= SPEAKS * prepared.floor_N**2
+        most_left = most_left and (k == 0 or gain >= EXACT * scale)
         if small and not most_left:
             return k
     later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std

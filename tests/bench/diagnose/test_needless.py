@@ -67,6 +67,7 @@ def test_one_that_the_others_have_made_needless_goes(monkeypatch):
 def test_one_that_takes_a_crumb_goes_and_one_that_takes_most_of_what_is_left_stays(monkeypatch):
     assert needless(monkeypatch, [400.0, 3.0, 2.5], []) == 1
     assert needless(monkeypatch, [400.0, 3.0, 1.1], []) is None
+    assert needless(monkeypatch, [40000.0, 3.0, 1.1], []) == 1  # no shape of the first is so exact
 
 
 def test_one_that_does_harm_later_goes_but_a_drift_may_turn(monkeypatch):
@@ -113,16 +114,17 @@ def test_a_cause_of_which_nothing_is_left_with_the_hum_beside_it_goes(after, gon
 
 
 @pytest.mark.parametrize(
-    ("harmful", "kept"),
+    ("harmful", "without", "kept"),
     [
-        ({"force_delay/wandering"}, ["force_delay/constant"]),
-        ({"force_delay/wandering", "force_delay/constant"}, ["force_delay/ageing"]),
-        ({"force_delay/wandering", "force_delay/constant", "force_delay/ageing"}, []),
+        ({"force_delay/wandering"}, 2.0, ["force_delay/constant"]),
+        ({"force_delay/wandering", "force_delay/constant"}, 2.0, ["force_delay/ageing"]),
+        ({"force_delay/wandering", "force_delay/constant", "force_delay/ageing"}, 2.0, []),
+        ({"force_delay/wandering"}, 0.9, []),
     ],
 )
-def test_where_the_shape_does_harm_the_cause_stays_in_one_that_does_none(monkeypatch, harmful, kept):
+def test_where_the_shape_does_harm_the_cause_stays_in_one_that_does_none(monkeypatch, harmful, without, kept):
     """A cause is in the way in its best shape; it is only dropped where it is so too in the shape it was found in, and
-    in the best that has no course in time."""
+    in the best that has no course in time; or where what was held out is met better `without` it (N²) than so."""
 
     def fit(*names: str) -> Any:
         pairs = [name.split("/") for name in names]
@@ -150,7 +152,7 @@ def test_where_the_shape_does_harm_the_cause_stays_in_one_that_does_none(monkeyp
     monkeypatch.setattr(module, "_flagged_square", lambda *_: 0.0)
     monkeypatch.setattr(module, "_needless", asked_of)
     monkeypatch.setattr(module, "_doubtful", lambda *_: None)
-    monkeypatch.setattr(module, "_dropped", lambda prepared, path, fits, number, floor: ([base], [1.0], [1.0]))
+    monkeypatch.setattr(module, "_dropped", lambda prepared, path, fits, number, floor: ([base], [without], [1.0]))
     monkeypatch.setattr(module, "steadier", lambda short, found, own: steady if found is final else found)
     path: Any = SimpleNamespace(fits=[base, plain])
     prepared: Any = SimpleNamespace(short=None)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose import evidence, verdict
-from bench.diagnose.evidence import TRACE, Evidence
+from bench.diagnose.evidence import EXACT, Evidence
 from bench.diagnose.noise import Colour
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.path import Measure, Path
@@ -126,7 +126,7 @@ def test_a_third_cause_must_take_its_share_of_all():
 def test_beside_a_giant_a_trace_may_be_what_its_shape_misses():
     ranks = {(): {"force_drift": 1300.0}, ("force_drift",): {"backlash": 1000.0}}
     of_the_giant = 300.0 / (3e6 - NOISE)
-    assert of_the_giant < TRACE
+    assert of_the_giant < EXACT
     assert named(Told(ranks, fit(1000.0, "force_drift", "backlash"))) == ["force_drift"]
 
 
