@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 HIDDEN = 2.0  # times as many samples stick as show one by one
 UNTOLD = "; most of them cannot be told from readings that are equal by chance, and stay in"
-SEEN = 0.001  # of the samples that repeat: told, whatever they add to the error
+SEEN = 2e-4  # of the samples that repeat: told, whatever they add to the error
 
 
 def channel_causes(m: Measurement, prepared: Prepared, flags: Faults, before_N: Array, final: Fit) -> list[CauseFound]:

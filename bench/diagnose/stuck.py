@@ -21,6 +21,7 @@ ACCIDENTS = 0.05  # of the runs flagged, where a channel sticks
 HARDLY = 0.8  # steps: less noise hardly leaves one where the force is at rest
 STANDS = 0.5  # share of equal pairs beyond which noise is less than half a step
 LEAPS = 3  # steps by which what has stuck in such a channel catches up, at the least
+DIGITS, WHOLE = 12, 1e-3  # decimal places that are looked for; and how far off a whole number of them is one
 SLOWED = (2, 3, 4)  # samples that a channel says one value for, when it is for a while that much slower
 
 
@@ -123,6 +124,16 @@ def equal_by_chance(force: Array) -> float:
     sizes, counts = np.unique(np.rint(change[change > least] / max(least, 1e-300)), return_counts=True)
     if counts.max(initial=0) >= FEW_REPEATS:  # changes come in steps: those of 0 are as many as of one step either way
         return 0.5 * float(counts.max())
-    finest = least * float(sizes[0]) if len(sizes) else 0.0
+    # of any samples two are as close as that one expects one equal pair: what they are written with is finer
+    finest = min(least * float(sizes[0]), _last_digit(force)) if len(sizes) else 0.0
     scatter = 1.4826 * float(np.median(change))
     return len(force) * finest / max(float(np.sqrt(2.0 * np.pi)) * scatter, 1e-300)
+
+
+def _last_digit(force: Array) -> float:
+    """The decimal place with which most values (m,) end; 0 where they have all that a number of the machine has."""
+    for place in range(DIGITS):
+        scaled = force * 10.0**place
+        if np.mean(np.abs(scaled - np.rint(scaled)) < WHOLE) > 0.5:
+            return 10.0**-place
+    return 0.0
