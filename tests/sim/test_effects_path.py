@@ -356,6 +356,8 @@ class TestLimitsAndFaults:
         assert_allclose(sample(active("saturation", "upper", limit=4.0), self.force), np.minimum(self.force, 4))
         stopped = sample(active("saturation", "stop", limit=4.0, passes=0.05), self.force)
         assert_allclose(stopped, np.minimum(self.force, 4) + 0.05 * np.maximum(self.force - 4, 0), atol=1e-12)
+        folded = sample(active("saturation", "folding", limit=4.0, falls=0.1), self.force)
+        assert_allclose(folded, np.minimum(self.force, 4) - 0.1 * np.maximum(self.force - 4, 0), atol=1e-12)
         # Slope 1 at the limit, and 1/e of it where the logarithm has grown by 1.
         beyond = np.array([4.0, 4.0 + 1e-6, 4.0 + 0.2 * (math.e - 1.0), -4.0 - 0.2 * (math.e - 1.0), 3.0])
         bent = sample(active("saturation", "compressing", limit=4.0, reach=0.2), beyond)
