@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from sim.effects import Effect
 
-from .candidates import Signatures, Start
+from .candidates import Reach, Signatures, Start, narrowed
 from .numbers import cause_of
 
 Array = NDArray[np.float64]
@@ -21,7 +21,7 @@ TAKES = 0.5  # of that: so much a shape must take
 TIMES = np.geomspace(0.05, 3.0, 12)  # of the time from the first sample to the last
 
 
-def told_in_air(at: Signatures, effect: Effect, believed: Array) -> Start | None:
+def told_in_air(at: Signatures, effect: Effect, believed: Array, reach: Reach) -> Start | None:
     """The drift that forces in air tell of, to start from with the pad as it was believed (P,); None where they tell of
     none, or the pad may pull there."""
     data, structure = at.data, at.fit.structure
@@ -42,7 +42,7 @@ def told_in_air(at: Signatures, effect: Effect, believed: Array) -> Start | None
     best, takes = None, TAKES * moves
     span_s = float(data.time_s[-1] - data.time_s[0])
     for form in effect.forms:
-        plain = cause_of(effect, form)
+        plain = cause_of(effect, narrowed(form, reach))
         if plain.amplitude is None:
             continue
         timed = any(p.name == "time_constant" for p in plain.fitted)

@@ -230,7 +230,7 @@ class Sieve:
         more = [one_more_mode(at, rates, cause_of(*pair)) for pair in pairs]
         out += [(cause.id, Start(cause, np.inf, pad)) for cause, pad in (m for m in more if m is not None)]
         asked = {effect.id: effect for effect, _ in pairs}
-        aired = [(id_, told_in_air(at, effect, believed)) for id_, effect in asked.items()]
+        aired = [(id_, told_in_air(at, effect, believed, self.reach)) for id_, effect in asked.items()]
         return [*out, *((id_, start) for id_, start in aired if start is not None)]
 
     def _sieved(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose import diagnose
-from bench.diagnose.candidates import Signatures
+from bench.diagnose.candidates import Reach, Signatures
 from bench.diagnose.channel import faults
 from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import believed_structure
@@ -38,13 +38,32 @@ def test_a_drift_is_told_by_the_forces_in_air():
         prepared = prepare(m, faults(m.force_N).good)
         structure = believed_structure(Model.from_dict(c.believed), prepared)
         at = Signatures(prepared.short, refit(prepared.short, structure, structure.pad.x(), 12, 1e-5))
-        begun = told_in_air(at, effects.effect("force_drift"), structure.pad.x())
+        reach = Reach.of(prepared.short, structure, prepared.sample_s)
+        begun = told_in_air(at, effects.effect("force_drift"), structure.pad.x(), reach)
         assert begun is not None and begun.cause.form.name == "turning"
         assert begun.cause.start["time_constant"] == pytest.approx(TURNS_S, rel=0.3)
         assert begun.cause.start["rate"] == pytest.approx(0.5 * np.pi * SWING_N / TURNS_S, rel=0.5)
         calm = replace(prepared.short, force_N=at.force)  # as the model has it: nothing moves in air
-        assert told_in_air(Signatures(calm, at.fit), effects.effect("force_drift"), structure.pad.x()) is None
-        assert told_in_air(at, effects.effect("force_bias"), structure.pad.x()) is None
+        assert told_in_air(Signatures(calm, at.fit), effects.effect("force_drift"), structure.pad.x(), reach) is None
+        assert told_in_air(at, effects.effect("force_bias"), structure.pad.x(), reach) is None
+
+
+def test_a_drift_that_bends_is_begun_within_what_the_data_tell():
+    """Not at the first sample: a rate that is another one for a moment is a step, and a bias beside a drift."""
+    for seed in range(5):
+        c = draw_case(seed, (), 1.0, contact="unilateral", protocol="rate_sweep", rate_hz=200.0)
+        m = measurement(c)
+        since_s = m.force_time_s - m.force_time_s[0]
+        m = replace(m, force_N=m.force_N + 0.02 * np.minimum(since_s, 0.4 * since_s[-1]))
+        prepared = prepare(m, faults(m.force_N).good)
+        structure = believed_structure(Model.from_dict(c.believed), prepared)
+        at = Signatures(prepared.short, refit(prepared.short, structure, structure.pad.x(), 12, 1e-5))
+        reach = Reach.of(prepared.short, structure, prepared.sample_s)
+        begun = told_in_air(at, effects.effect("force_drift"), structure.pad.x(), reach)
+        assert begun is not None
+        for p in begun.cause.form.parameters:
+            assert p.unit != "s" or p.fixed or p.upper <= 100.0 * reach.span_s
+            assert p.name != "bends_at" or 0.1 * reach.span_s < p.lower < begun.cause.start["bends_at"]
 
 
 @pytest.mark.slow
