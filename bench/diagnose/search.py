@@ -355,12 +355,10 @@ class Search(Shaping):
             return ranked
         shapes = families(self.short, best, [len(best.structure.causes) - 1])[0][1:]
         tried = [t for t in (self._trial(m.fit) for m in shapes) if believable(t.fit, self.prepared)]
-        if not tried:
-            return ranked
-        again = self._carried(min(tried, key=lambda t: t.score), ALL)
-        if again.fit.chi2 - self.expected > HALF * (best.chi2 - self.expected):
-            return ranked
-        return sorted([again, *ranked[1:]], key=lambda t: t.score)
+        again = self._carried(min(tried, key=lambda t: t.score), ALL) if tried else None
+        if again is None or again.fit.chi2 - self.expected > HALF * (best.chi2 - self.expected):
+            again = self._a_longer_wave(ranked)
+        return ranked if again is None else sorted([again, *ranked[1:]], key=lambda t: t.score)
 
     def _two_instead(self, path: Path, plain: Trial, shaped: Trial) -> bool:
         """Whether a first cause in a shape of many numbers does what two plain ones do better, with fewer."""

@@ -8,17 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from .candidates import CHANNEL, Signatures, alike, forms, narrowed, starts
+from .candidates import CHANNEL, Signatures, alike, forms, narrowed, starts, with_periods
 from .evidence import RIVAL, believable, unexplained
 from .numbers import Cause, cause_of
 from .path import Trial
 from .refit import Fit, last, reduced, refit
+from .ripple import ripples
 from .shapes import begun_anew, departed
 from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_first
 
 MUCH, MOST = 0.25, 0.5  # of its gain, and of what is left, that a further cause takes beside a second one of a kind
 AS_WELL = 0.8  # share of a second cause of a kind's gain, that a further cause's beside the first reaches
 CLEAN, UNCLEAN = 0.03, 0.05  # of what was left that a fit leaves: nothing, and something
+FURTHER, FAR_LESS = 1.4, 5.0  # times the longest wave sought; and what it leaves, that the next leaves at the least
 RIVALS = 2  # beside the best, that are asked for their best shapes
 
 
@@ -92,6 +94,21 @@ class Shaping(Sieve):
         asked = {t.id for t in shaped}
         rest = [*(t for t in shaped if t is not lead), *(t for t in ranked if t.id not in asked)]
         return [lead, *sorted(rest, key=lambda t: t.score)]
+
+    def _a_longer_wave(self, ranked: Sequence[Trial]) -> Trial | None:
+        """The first of the candidates with a somewhat longer wave than is sought, where it ends within that and leaves
+        far less than any other that is believed; else None. Part of one wave is any curve, but then no other has it."""
+        fit, cause = ranked[0].fit, ranked[0].cause
+        if not ripples(cause.form):
+            return None
+        limits, index = next(p for p in cause.form.parameters if p.name == "period"), len(fit.structure.causes) - 1
+        own = replace(cause, form=with_periods(cause.form, limits.lower, FURTHER * limits.upper))
+        structure, pad = fit.structure.with_cause_at(index, own), fit.x[: len(fit.structure.pad.coordinates)]
+        x = structure.x(pad, fit.structure.values(fit.x), fit.of_run)
+        longer = self._trial(refit(self.short, structure, x, ALL, 1e-8))
+        others = (t.fit.chi2 for t in ranked[1:] if believable(t.fit, self.prepared))
+        left, next_left = longer.fit.chi2 - self.expected, min(others, default=np.inf) - self.expected
+        return longer if believable(longer.fit, self.prepared) and next_left > FAR_LESS * max(left, 0.0) else None
 
     def _united(self, now: Fit, beside: Trial) -> Fit:
         """The fit with one cause in place of two of a kind, itself and another shape of it: a shape that has what both

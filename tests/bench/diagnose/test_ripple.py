@@ -17,6 +17,7 @@ from bench.diagnose.sieve import plainer_first
 from sim.effects import effect
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
+from tests.campaign.plan import Item
 from tests.truth.cases import draw_case
 
 DEPTH_mm = np.concatenate([np.linspace(0.0, 3.0, 400), np.linspace(3.0, 0.0, 200)])
@@ -88,6 +89,20 @@ def test_a_ripple_that_goes_with_the_load_has_a_size_and_is_not_two_waves_that_c
     size, true_N = said.causes[0].parameters["amplitude"], c.truth.parameters["cogging"]["amplitude"]
     assert size.std < 0.4 * size.value
     assert abs(size.value - true_N) < 0.35 * true_N
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_a_wave_somewhat_longer_than_any_sought_is_one_where_all_else_leaves_far_more():
+    """A case in which a campaign named a bias and adhesion, and left seven tenths: the load shifts the wave's phase, so
+    that it looks as long as 1.62 times the travel, and 1.6 was the most."""
+    sizes, shapes = (0.8848, 0.674), ("armature_reaction", "hertz_joint")
+    c = Item("pair", ("cogging", "frame_compliance"), shapes, sizes, 167907098).case()
+    said = diagnose(measurement(c), Model.from_dict(c.believed))
+    assert said.verdict == "explained" and [cause.id for cause in said.causes] == ["cogging", "frame_compliance"]
+    for cause, name in zip(said.causes, ("period", "compliance"), strict=True):
+        assert cause.parameters[name].value == pytest.approx(c.truth.parameters[cause.id][name], rel=0.1)
+    assert said.held_out_after < 1.1 * said.noise_floor
 
 
 def test_starts_are_apart_and_within_bounds():
