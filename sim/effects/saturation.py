@@ -109,7 +109,7 @@ EFFECT = Effect(
             what="in compression, where the output falls again",
             parameters=(
                 _LIMIT,
-                Parameter("falls", "1", 0.0, 0.5, 0.1, "share of what is beyond by which it falls"),
+                Parameter("falls", "1", 0.0, 1.0, 0.1, "share of what is beyond by which it falls"),
             ),
             sought=False,
             blocks={"sampling": folding},
