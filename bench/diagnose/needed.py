@@ -149,12 +149,15 @@ def _needless(
         most_left = most_left and (k == 0 or gain >= EXACT * scale)
         if small and not most_left:
             return k
-    later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
     plain = later_square(prepared, fits[0])
-    if plain > UNTOLD * squares[0]:  # what comes early does not tell the pad itself, nor any cause that helps with that
-        doubted = min(range(last + 1), key=lambda k: _sure(path, fits, k))
-        return doubted if later > plain and _sure(path, fits, doubted) < DOUBTED else None
-    if all(later <= HARM * later_square(prepared, fit) for fit in fits[:-1]):
+    not_told = plain > UNTOLD * squares[0]  # what comes early does not tell the pad itself
+    least, doubted = min((_sure(path, fits, k), k) for k in range(last + 1)) if not_told else (1.0, 0)
+    if not_told and least >= DOUBTED:
+        return None
+    later = later_square(prepared, fits[-1]) - 2.0 * prepared.floor_square_std
+    if not_told:  # nor any cause, then, that helps with the end
+        return doubted if later > plain else None
+    if later <= HARM * plain and all(later <= HARM * later_square(prepared, fit) for fit in fits[1:-1]):
         return None
     # a drift that turns or ends is one, though its begin does not foretell that; nor does half of a course the rest
     causes = fits[-1].structure.causes[own:]

@@ -171,8 +171,7 @@ def _longer(short: Data, fit: Fit, index: int) -> Fit:
         return fit
 
     def carried(form: Form, start: Mapping[str, float], pad: Array, steps: int) -> Fit:
-        own = cause_of(cause.effect, with_periods(form, 0.5 * period_mm, longest_mm), start)
-        return refit(short, *_in_place(fit, index, own, pad), steps, NEARLY)
+        return waving(short, fit, index, with_periods(form, 0.5 * period_mm, longest_mm), start, pad, steps, NEARLY)
 
     bare = refit(short, *reduced(fit, index), END, 1e-8)
     signatures, end = Signatures(short, bare), len(structure.pad.coordinates)
@@ -187,13 +186,21 @@ def _longer(short: Data, fit: Fit, index: int) -> Fit:
 
 def _exchanged(short: Data, fit: Fit, index: int) -> Fit:
     """The fit with the larger of a cause's two waves for the first."""
-    cause, end = fit.structure.causes[index], len(fit.structure.pad.coordinates)
-    values = larger_first(cause.form, fit.structure.values(fit.x)[index])
+    form = fit.structure.causes[index].form
+    values = larger_first(form, fit.structure.values(fit.x)[index])
     if values is None:
         return fit
-    form = with_periods(cause.form, 0.5 * values["period"], 2.0 * values["period"])
-    own = cause_of(cause.effect, form, values)
-    return refit(short, *_in_place(fit, index, own, fit.x[:end]), END, 1e-8)
+    form = with_periods(form, 0.5 * values["period"], 2.0 * values["period"])
+    return waving(short, fit, index, form, values, fit.x[: len(fit.structure.pad.coordinates)])
+
+
+def waving(
+    short: Data, fit: Fit, index: int, form: Form, start: Mapping[str, float], pad: Array,
+    steps: int = END, tolerance: float = 1e-8,
+) -> Fit:  # fmt: skip
+    """The fit carried on with one of its causes in a form of other bounds, begun at `start`, and the pad at `pad`."""
+    own = cause_of(fit.structure.causes[index].effect, form, start)
+    return refit(short, *_in_place(fit, index, own, pad), steps, tolerance)
 
 
 def _in_place(fit: Fit, index: int, cause: Cause, pad: Array) -> tuple[Structure, Array]:

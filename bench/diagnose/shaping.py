@@ -14,7 +14,7 @@ from .numbers import Cause, cause_of
 from .path import Trial
 from .refit import Fit, last, reduced, refit
 from .ripple import ripples
-from .shapes import begun_anew, departed
+from .shapes import begun_anew, departed, waving
 from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_first
 
 MUCH, MOST = 0.25, 0.5  # of its gain, and of what is left, that a further cause takes beside a second one of a kind
@@ -98,14 +98,13 @@ class Shaping(Sieve):
     def _a_longer_wave(self, ranked: Sequence[Trial]) -> Trial | None:
         """The first of the candidates with a somewhat longer wave than is sought, where it ends within that and leaves
         far less than any other that is believed; else None. Part of one wave is any curve, but then no other has it."""
-        fit, cause = ranked[0].fit, ranked[0].cause
-        if not ripples(cause.form):
+        fit, form = ranked[0].fit, ranked[0].cause.form
+        if not ripples(form):
             return None
-        limits, index = next(p for p in cause.form.parameters if p.name == "period"), len(fit.structure.causes) - 1
-        own = replace(cause, form=with_periods(cause.form, limits.lower, FURTHER * limits.upper))
-        structure, pad = fit.structure.with_cause_at(index, own), fit.x[: len(fit.structure.pad.coordinates)]
-        x = structure.x(pad, fit.structure.values(fit.x), fit.of_run)
-        longer = self._trial(refit(self.short, structure, x, ALL, 1e-8))
+        limits = next(p for p in form.parameters if p.name == "period")
+        form, values = with_periods(form, limits.lower, FURTHER * limits.upper), fit.structure.values(fit.x)
+        pad = fit.x[: len(fit.structure.pad.coordinates)]
+        longer = self._trial(waving(self.short, fit, len(values) - 1, form, values[-1], pad, ALL))
         others = (t.fit.chi2 for t in ranked[1:] if believable(t.fit, self.prepared))
         left, next_left = longer.fit.chi2 - self.expected, min(others, default=np.inf) - self.expected
         return longer if believable(longer.fit, self.prepared) and next_left > FAR_LESS * max(left, 0.0) else None

@@ -19,6 +19,7 @@ Doebelin, Measurement Systems: Application and Design, 4th ed., McGraw-Hill, 199
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from sim.effects.base import Effect, Form, Parameter
 from sim.jit import State, block
@@ -37,15 +38,14 @@ def upper(dt: float, force: float, state: State, p: State) -> float:
 
 
 @block
-def stop(dt: float, force: float, state: State, p: State) -> float:
-    """A share of what is beyond +limit; p = (limit, passes)."""
+def sloping(dt: float, force: float, state: State, p: State) -> float:
+    """Up, or down again, by a share of what is beyond +limit; p = (limit, slope)."""
     return force if force <= p[0] else p[0] + p[1] * (force - p[0])
 
 
-@block
-def folding(dt: float, force: float, state: State, p: State) -> float:
-    """Down again by a share of what is beyond +limit; p = (limit, falls)."""
-    return force if force <= p[0] else p[0] - p[1] * (force - p[0])
+def _falling(values: Mapping[str, float]) -> tuple[float, ...]:
+    """What `folding` is of `sloping`."""
+    return (values["limit"], -values["falls"])
 
 
 @block
@@ -102,7 +102,7 @@ EFFECT = Effect(
                 Parameter("passes", "1", 0.0, 0.5, 0.05, "share of what is beyond that the cell feels"),
             ),
             sought=False,
-            blocks={"sampling": stop},
+            blocks={"sampling": sloping},
         ),
         Form(
             name="folding",
@@ -112,7 +112,8 @@ EFFECT = Effect(
                 Parameter("falls", "1", 0.0, 1.0, 0.1, "share of what is beyond by which it falls"),
             ),
             sought=False,
-            blocks={"sampling": folding},
+            blocks={"sampling": sloping},
+            pack=_falling,
         ),
         Form(
             name="recovering",

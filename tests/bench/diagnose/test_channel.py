@@ -1,4 +1,4 @@
-"""What the force channel shows by itself: repeats in a coarse channel, lines that are no mains hum, and what swings."""
+"""What the force channel shows by itself: repeats, ceilings, strays, and what swings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from bench.diagnose import diagnose, hum, swing
+from bench.diagnose import diagnose, swing
 from bench.diagnose.channel import faults, of_the_model
 from bench.diagnose.channel_causes import joined
 from bench.diagnose.data import Data
@@ -287,108 +287,6 @@ def test_samples_beyond_a_limit_that_was_fitted_are_told():
         fit = Fit(structure, structure.x(pad.x()), 0.0, np.eye(3), True)
         assert np.array_equal(beyond_limit(data, fit), 3.0 * depth > 4.5)
         assert not beyond_limit(data, Fit(Structure(pad), pad.x(), 0.0, np.eye(2), True)).any()
-
-
-@pytest.mark.parametrize(("frequency_Hz", "sample_s", "mains"), [
-    (50.0, 0.001, True), (60.02, 0.001, True), (100.0, 0.002, True), (150.0, 0.001, True),
-    (8.0, 0.001, False), (23.0, 0.001, False), (75.0, 0.001, False),
-    (40.0, 0.01, True),  # 60 Hz at 100 samples a second
-    (9.95, 0.02, True),  # 59.95 Hz at 50
-    (45.2, 0.005, False), (24.6, 0.02, False),  # of 124.6 Hz at the nearest: no large grid is so far off
-])  # fmt: skip
-def test_a_line_is_of_the_mains_by_its_frequency_alone(frequency_Hz, sample_s, mains):
-    line = hum.Line(frequency_Hz, 0.01, 0.0, 0.0, 0.0, sample_s)
-    assert line.of_the_mains is mains
-
-
-def _holds(stamp_s: np.ndarray, error_N: np.ndarray, length: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Parts as of holds of so many samples with nothing between them, and no curve taken out."""
-    cuts = range(0, len(stamp_s) - length + 1, length)
-    return [(stamp_s[k : k + length], error_N[k : k + length], np.zeros((length, 0))) for k in cuts]
-
-
-@pytest.mark.parametrize(("frequency_Hz", "rate_Hz", "jitter"), [
-    (60.0, 114.0, 0.02), (60.0, 114.0, 0.0), (49.98, 103.0, 0.0), (60.0, 100.0, 0.02), (50.03, 1000.0, 0.1),
-    (100.0, 130.0, 0.02),
-])  # fmt: skip
-def test_a_line_is_found_at_the_mains_own_frequency_however_it_is_folded(frequency_Hz, rate_Hz, jitter):
-    for seed in SEEDS:
-        rng = np.random.default_rng(seed)
-        t = (np.arange(4000) + jitter * rng.standard_normal(4000)) / rate_Hz
-        t -= t[0]
-        e = 0.02 * np.sin(2 * np.pi * frequency_Hz * t + 0.3) + 0.01 * rng.standard_normal(len(t))
-        line = hum.find(0.0, _holds(t, e, 500), t, e)
-        assert line is not None
-        assert line.frequency_Hz == pytest.approx(frequency_Hz, abs=0.01)
-        assert line.amplitude_N == pytest.approx(0.02, rel=0.05)
-        assert line.growth_1_N == 0.0
-
-
-def test_a_line_that_grows_with_the_load_is_stated_at_the_mean_force():
-    for seed in SEEDS:
-        rng = np.random.default_rng(seed)
-        t = np.arange(8000) / 500.0
-        load = np.repeat([0.0, 2.0, 4.0, 10.0], 2000)
-        e = 0.02 * (0.7 + 0.1 * load) * np.sin(2 * np.pi * 50.0 * t) + 0.01 * rng.standard_normal(len(t))
-        line = hum.find(0.0, _holds(t, e, 1000), t, load + e)
-        assert line is not None
-        assert line.amplitude_N == pytest.approx(0.02 * 1.1, rel=0.05)
-        assert line.growth_1_N * line.amplitude_N == pytest.approx(0.002, rel=0.15)
-        assert np.std(e - line.force_N(t, load)) == pytest.approx(0.01, rel=0.03)
-
-
-@pytest.mark.parametrize(
-    "shape",
-    [
-        "wanders with its harmonics",
-        *(
-            pytest.param(s, marks=pytest.mark.long)
-            for s in ("sine", "odd harmonics", "one way", "swells", "wanders", "let through late")
-        ),
-    ],
-)
-def test_the_shape_of_a_line_is_found_and_not_more_than_that(shape):
-    for seed in SEEDS:
-        rng = np.random.default_rng(seed)
-        t = np.arange(36_500) / 730.0
-        slow = np.sin(2 * np.pi * t / 23.0 + 0.4)
-        swells = 1.0 + (0.3 * slow if shape == "swells" else 0.0)
-        angle = 2 * np.pi * 50.0 * t + (0.4 * slow if shape.startswith("wanders") else 0.0)
-        tops = np.sin(3 * angle) / 5 - np.sin(5 * angle + 0.2) / 10 if "harmonics" in shape else 0.0
-        clean = 0.03 * (swells * np.sin(angle + 0.5) + tops)
-        if shape == "one way":  # a rectifier of half waves, from a quarter of the crest on
-            clean = 0.06 * np.maximum(np.sin(angle + 0.5) - 0.25, 0.0)
-            clean -= np.mean(clean)
-        if shape == "let through late":
-            mains = 2 * np.pi * 50.0 * t + 2.1
-            clean = 0.03 * np.sin(mains) * (mains % np.pi > 1.2)
-        e = clean + 0.01 * rng.standard_normal(len(t))
-        line = hum.find(0.0, _holds(t, e, 4500), t, e)
-        assert line is not None
-        assert bool(line.swing) == (shape == "swells" or shape.startswith("wanders"))
-        others = {
-            "odd harmonics": [5],
-            "wanders with its harmonics": [5],
-            "one way": [2, 4, 5, 7],
-        }  # its sixth is 0.01 of the noise
-        assert [order for order, _, _ in line.higher] == others.get(shape, [])
-        assert line.growth_1_N == 0.0
-        assert line.fires_rad == pytest.approx(1.2 if shape == "let through late" else 0.0, abs=0.05)
-        assert np.std(line.force_N(t, np.zeros(len(t))) - clean) < 1.5e-3
-
-
-@pytest.mark.long
-def test_a_line_is_told_by_the_times_at_which_forces_were_felt():
-    """A clock that gains 200 microseconds a second turns a hum by half a wave within a minute of its stamps."""
-    for seed in (1, 2):
-        kinds = {"protocol": "staircase", "noise_kind": "white", "own_clock": True}
-        c = draw_case(seed, ("clock_skew", "mains_hum"), 1.0, rate_hz=240.0, **kinds)
-        found = {cause.id: cause for cause in diagnose(measurement(c), Model.from_dict(c.believed)).causes}
-        for name, true in c.truth.parameters["mains_hum"].items():
-            assert found["mains_hum"].parameters[name].value == pytest.approx(true, rel=0.02)
-        assert found["clock_skew"].parameters["skew"].value == pytest.approx(
-            c.truth.parameters["clock_skew"]["skew"], rel=0.1
-        )
 
 
 def test_what_sways_at_a_frequency_of_its_own_is_seen_and_noise_is_not():

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from bench.diagnose import diagnose
 from bench.diagnose.candidates import Reach, Signatures
@@ -20,7 +21,18 @@ from sim.model import Model
 from tests.bench.diagnose.small import measurement
 from tests.truth.cases import Case, draw_case
 
+Array = NDArray[np.float64]
+
 SWING_N, TURNS_S = 0.3, 9.0  # of the warmth of a room: a sine whose quarter takes so long
+
+
+def told(m: Measurement, believed: Model) -> tuple[Signatures, Array, Reach]:
+    """What a drift is looked for with: what a refit leaves, the believed pad's vector, and how far the data reach."""
+    prepared = prepare(m, faults(m.force_N).good)
+    structure = believed_structure(believed, prepared)
+    x = structure.pad.x()
+    at = Signatures(prepared.short, refit(prepared.short, structure, x, 12, 1e-5))
+    return at, x, Reach.of(prepared.short, structure, prepared.sample_s)
 
 
 def wandering(seed: int) -> tuple[Case, Measurement]:
@@ -35,17 +47,14 @@ def wandering(seed: int) -> tuple[Case, Measurement]:
 def test_a_drift_is_told_by_the_forces_in_air():
     for seed in range(5):
         c, m = wandering(seed)
-        prepared = prepare(m, faults(m.force_N).good)
-        structure = believed_structure(Model.from_dict(c.believed), prepared)
-        at = Signatures(prepared.short, refit(prepared.short, structure, structure.pad.x(), 12, 1e-5))
-        reach = Reach.of(prepared.short, structure, prepared.sample_s)
-        begun = told_in_air(at, effects.effect("force_drift"), structure.pad.x(), reach)
+        at, pad, reach = told(m, Model.from_dict(c.believed))
+        begun = told_in_air(at, effects.effect("force_drift"), pad, reach)
         assert begun is not None and begun.cause.form.name == "turning"
         assert begun.cause.start["time_constant"] == pytest.approx(TURNS_S, rel=0.3)
         assert begun.cause.start["rate"] == pytest.approx(0.5 * np.pi * SWING_N / TURNS_S, rel=0.5)
-        calm = replace(prepared.short, force_N=at.force)  # as the model has it: nothing moves in air
-        assert told_in_air(Signatures(calm, at.fit), effects.effect("force_drift"), structure.pad.x(), reach) is None
-        assert told_in_air(at, effects.effect("force_bias"), structure.pad.x(), reach) is None
+        calm = replace(at.data, force_N=at.force)  # as the model has it: nothing moves in air
+        assert told_in_air(Signatures(calm, at.fit), effects.effect("force_drift"), pad, reach) is None
+        assert told_in_air(at, effects.effect("force_bias"), pad, reach) is None
 
 
 def test_a_drift_that_bends_is_begun_within_what_the_data_tell():
@@ -55,11 +64,8 @@ def test_a_drift_that_bends_is_begun_within_what_the_data_tell():
         m = measurement(c)
         since_s = m.force_time_s - m.force_time_s[0]
         m = replace(m, force_N=m.force_N + 0.02 * np.minimum(since_s, 0.4 * since_s[-1]))
-        prepared = prepare(m, faults(m.force_N).good)
-        structure = believed_structure(Model.from_dict(c.believed), prepared)
-        at = Signatures(prepared.short, refit(prepared.short, structure, structure.pad.x(), 12, 1e-5))
-        reach = Reach.of(prepared.short, structure, prepared.sample_s)
-        begun = told_in_air(at, effects.effect("force_drift"), structure.pad.x(), reach)
+        at, pad, reach = told(m, Model.from_dict(c.believed))
+        begun = told_in_air(at, effects.effect("force_drift"), pad, reach)
         assert begun is not None
         for p in begun.cause.form.parameters:
             assert p.unit != "s" or p.fixed or p.upper <= 100.0 * reach.span_s

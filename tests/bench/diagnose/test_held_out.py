@@ -64,8 +64,7 @@ def test_a_ceiling_that_falls_back_is_told_wherever_the_force_is_beyond_it():
     told, true, both = 0, 0, 0
     for seed in range(4):
         c = draw_case(seed, ("saturation",), 1.5, "folds_back", protocol="rate_sweep", rate_hz=150.0, jitter="none")
-        flagged, faulty = (
-            diagnose(measurement(c), Model.from_dict(c.believed)).flags["saturation"], c.truth.flags["saturated"],
-        )  # fmt: skip
+        flagged = diagnose(measurement(c), Model.from_dict(c.believed)).flags["saturation"]
+        faulty = c.truth.flags["saturated"]
         told, true, both = told + int(flagged.sum()), true + int(faulty.sum()), both + int((flagged & faulty).sum())
     assert both > 0.95 * true and both > 0.9 * told

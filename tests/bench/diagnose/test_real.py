@@ -12,7 +12,7 @@ from scipy.signal import savgol_filter
 from bench.recording.types import Measurement
 from docs import real_diagnosis
 from docs.real_cases import LEARNT_SHARE, MOST_SAMPLES, averaged, cases, end_of_learning, first_part
-from docs.real_outcome import Outcome, outcome
+from docs.real_outcome import Held, Outcome, outcome
 
 ROOT = Path(__file__).parents[3]
 DATA = Path(os.environ.get("PADBENCH_DATA", ROOT.parent / "shared" / "data"))
@@ -22,6 +22,12 @@ measured = pytest.mark.skipif(not DATA.is_dir(), reason="the measured data are n
 
 def of(folder: str, name: str) -> Outcome:
     return outcome(folder, name, dict(cases(DATA, folder))[name])
+
+
+def half_the_gap_N(held: Held) -> float:
+    """Half of what the force differs by between the two ways of what was held out."""
+    speed = np.gradient(held.position_mm, held.time_s)
+    return float(0.5 * (np.median(held.force_N[speed > 0.3]) - np.median(held.force_N[speed < -0.3])))
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +52,8 @@ def test_the_worked_example_finds_the_friction_of_its_strokes(example: Outcome) 
     assert example.diagnosis is not None
     friction = next(c for c in example.diagnosis.causes if c.id == "friction")
     (held,) = example.held
-    speed = np.gradient(held.position_mm, held.time_s)
-    force = held.force_N
-    half = 0.5 * (np.median(force[speed > 0.3]) - np.median(force[speed < -0.3]))  # of the gap between the two ways
     assert friction.confidence > 0.7
-    assert friction.parameters["coulomb"].value == pytest.approx(half, rel=0.2)
+    assert friction.parameters["coulomb"].value == pytest.approx(half_the_gap_N(held), rel=0.2)
 
 
 @measured
@@ -62,9 +65,7 @@ def test_friction_is_found_where_the_law_that_fits_best_alone_is_one_that_no_pad
     first, (held,) = found.diagnosis.causes[0], found.held
     assert first.id == "friction" and first.confidence > 0.7
     assert held.extended_N < 0.5 * held.force_N[held.counted].std()
-    speed = np.gradient(held.position_mm, held.time_s)
-    half = 0.5 * (np.median(held.force_N[speed > 0.3]) - np.median(held.force_N[speed < -0.3]))
-    assert first.parameters["coulomb"].value == pytest.approx(half, rel=0.2)
+    assert first.parameters["coulomb"].value == pytest.approx(half_the_gap_N(held), rel=0.2)
 
 
 @measured
