@@ -266,7 +266,9 @@ class Search(Shaping):
             united = self._united(now, turn.beside)
             if now.chi2 - united.chi2 > SAME * (now.chi2 - turn.beside.fit.chi2):
                 return united
-            turn.of_a_shape = not self._stays_beside(now, turn.beside.fit, best.fit)
+            turn.of_a_shape = not (
+                self._simpler(now, turn.beside.fit, best.fit) or self._stays_beside(now, turn.beside.fit, best.fit)
+            )
         return None
 
     def _told_at_full_rate(self, path: Path, turn: _Turn) -> None:

@@ -19,7 +19,7 @@ from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_
 
 MUCH, MOST = 0.25, 0.5  # of its gain, and of what is left, that a further cause takes beside a second one of a kind
 AS_WELL = 0.8  # share of a second cause of a kind's gain, that a further cause's beside the first reaches
-CLEAN, UNCLEAN = 0.03, 0.05  # of what was left that a fit leaves: nothing, and something
+CLEAN, UNCLEAN, LITTLE = 0.03, 0.05, 0.1  # of what was left that a fit leaves: nothing, something, and next to nothing
 FURTHER, FAR_LESS = 1.4, 5.0  # times the longest wave sought; and what it leaves, that the next leaves at the least
 RIVALS = 2  # beside the best, that are asked for their best shapes
 
@@ -150,6 +150,15 @@ class Shaping(Sieve):
             return False
         taken, left = reshaped.chi2 - both.fit.chi2, reshaped.chi2 - self.expected
         return taken > max(MUCH * (now.chi2 - further.chi2), MOST * left)
+
+    def _simpler(self, now: Fit, reshaped: Fit, further: Fit) -> bool:
+        """Whether a further cause leaves next to nothing of what a fit leaves, and is better than a second one of a
+        kind, or as good with fewer numbers: what two of a kind can do together tells nothing of its shape."""
+        better = reshaped.chi2 - further.chi2
+        no_worse = further.free < reshaped.free or (
+            further.free == reshaped.free and better > RIVAL * max(further.chi2 / self.expected, self.prepared.memory)
+        )
+        return better >= 0.0 and no_worse and further.chi2 - self.expected < LITTLE * (now.chi2 - self.expected)
 
     def _alone_clean(self, before: float, after: float, reshaped: float) -> bool:
         """Whether a further cause leaves nothing, and another shape of a cause found something beyond chance."""

@@ -192,6 +192,43 @@ def test_where_the_last_cause_has_another_shape_those_before_it_are_held_against
     assert search.exchanges == 2, "as it came in, and in its shape"
 
 
+class OfAKind(Told):
+    """A search in which no one shape of a cause does what two of its kind do, which do it without a further cause."""
+
+    def _united(self, now: Any, beside: Any) -> Any:
+        return now
+
+    def _stays_beside(self, now: Any, reshaped: Any, further: Any) -> bool:
+        return False
+
+
+@pytest.mark.parametrize(
+    ("second", "after"),
+    [
+        (1050.0, ["resonance", "force_delay"]),  # a second resonance is worse than a delay, of as many numbers
+        (1025.0, ["resonance"]),  # it is as good
+    ],
+)
+def test_two_of_a_kind_do_not_stand_for_a_shape_where_one_other_cause_does_better(second, after):
+    ranks: Any = {(): {"resonance": 7000.0}, ("resonance",): {"force_delay": 1010.0, "resonance": second}}
+    assert named(OfAKind(ranks, None)) == after
+
+
+@pytest.mark.parametrize(
+    ("numbers", "second", "further", "simpler"),
+    [
+        ((3, 1), 1020.0, 1010.0, True),
+        ((3, 1), 1005.0, 1010.0, False),  # it leaves more
+        ((1, 3), 1050.0, 1010.0, False),  # it has more numbers
+        ((3, 1), 4020.0, 4010.0, False),  # much is left
+    ],
+)
+def test_a_cause_of_few_numbers_is_no_worse_than_a_second_of_a_kind(numbers, second, further, simpler):
+    now, two, other = fit(20e3, "set"), fit(second, "set", "set"), fit(further, "set", "offset")
+    two.free, other.free = numbers
+    assert OfAKind({}, None)._simpler(now, two, other) is simpler
+
+
 class Counting(Told):
     """A search that counts its turns."""
 
