@@ -30,7 +30,7 @@ from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import families
-from .shaping import Shaping
+from .shaping import RIVALS, Shaping
 from .sieve import ALL, BETTER, COMPARED, MORE
 
 Array = NDArray[np.float64]
@@ -50,6 +50,7 @@ LESS = 0.1  # of what those leave, that two in their place leave
 MISSED, SHAPED = 0.75, 2  # of what a further cause takes, that it took in the shape in which it came in; and how many
 # rivals are asked for their shapes then
 MOST_CAUSES = 3
+MOST_NEAR = 8  # that stood close behind a cause, and are tried in its place
 SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
 LONG_WAVES = 3  # starts of a wave that is longer than those sought
@@ -305,9 +306,9 @@ class Search(Shaping):
         return [ranked[0], *others]
 
     def _compare(self, path: Path) -> None:
-        """Causes that came in amid others which have gone since, or in another shape that missed much of what they
-        take, beside what stood near them there, where the path has ended: the others' errors, and those of a shape,
-        tell nothing of how sure their names are."""
+        """Causes that came in amid others which have gone since, or behind one, or in another shape that missed much of
+        what they take, beside what stood near them there, where the path has ended: the others' errors, and those of a
+        shape, tell nothing of how sure their names are."""
         final = path.fits[-1]
         own = len(path.fits[0].structure.causes)
         named = [c.id for c in final.structure.causes]
@@ -317,6 +318,8 @@ class Search(Shaping):
                 continue
             came, beside, then = stage
             amid = not {c.id for c in came.fit.structure.causes} <= set(named)
+            room = RIVAL * max(came.fit.chi2 / self.expected, then.memory)
+            amid |= any(t.fit.chi2 < came.fit.chi2 - room for t in beside if t.id not in named)
             other = index > own and came.cause.form.name != final.structure.causes[index].form.name
             if not (amid or other):
                 continue
@@ -447,9 +450,10 @@ class Search(Shaping):
         own = len(self.believed.causes)
         for index in range(own, len(best.structure.causes)):
             stage = min(index - own, len(path.tried) - 1)
-            rivals = path.tried[stage][:5] + path.tried[-1][:4]
+            near = self._near(path.fits[stage], path.rivals[stage], MOST_NEAR)
+            rivals = [*path.tried[stage][:5], *(t.id for t in near), *path.tried[-1][:4]]
             if path.fits[-1].chi2 <= 1.05 * self.expected:
-                rivals = [t.id for t in self._near(path.fits[stage], path.rivals[stage])]
+                rivals = [t.id for t in near[:RIVALS]]
             present = {c.id for c in best.structure.causes}
             rivals = [r for r in dict.fromkeys(rivals) if r not in present]
             if not rivals:

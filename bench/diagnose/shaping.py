@@ -59,10 +59,10 @@ class Shaping(Sieve):
         structure, x = reduced(fit, index)
         return refit(self.short, structure, x, 10, 1e-5)
 
-    def _near(self, before: Fit, ranked: Sequence[Trial]) -> list[Trial]:
-        """Those that stood close behind the first of a stage."""
+    def _near(self, before: Fit, ranked: Sequence[Trial], most: int = RIVALS) -> list[Trial]:
+        """Those that stood close behind the first of a stage, `most` at the most."""
         gain = before.chi2 - ranked[0].fit.chi2
-        return [t for t in ranked[1 : 1 + RIVALS] if before.chi2 - t.fit.chi2 > CLOSE * gain]
+        return [t for t in ranked[1 : 1 + most] if before.chi2 - t.fit.chi2 > CLOSE * gain]
 
     def _shaped(self, trial: Trial) -> Trial:
         """A trial with that one of its causes in another form of which it gains most; its own cause stays the last."""

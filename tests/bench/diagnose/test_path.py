@@ -10,98 +10,17 @@ import numpy as np
 import pytest
 
 from bench.diagnose import evidence, verdict
-from bench.diagnose.evidence import EXACT, Evidence
+from bench.diagnose.evidence import EXACT
 from bench.diagnose.noise import Colour
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.path import Measure, Path
 from bench.diagnose.result import Number
-from bench.diagnose.search import Search
-from bench.diagnose.work import Work
 from sim.effects import effect
+from tests.bench.diagnose.told import NOISE, Told, fit, named
 
 module = importlib.import_module("bench.diagnose.search")
-NOISE = 1000.0
-
-
-def fit(chi2: float, *ids: str) -> Any:
-    """A fit of causes by their ids, each with the name of its form behind a stroke where that is not the first."""
-    pairs = [i.partition("/") for i in ids]
-    causes = tuple(SimpleNamespace(id=i, form=SimpleNamespace(name=name, has_a_course=False)) for i, _, name in pairs)
-    return SimpleNamespace(chi2=chi2, structure=SimpleNamespace(causes=causes), free=len(ids))
-
-
-class Told(Search):
-    """A search that is told what it finds: by the ids found so far, the candidates with their χ², best first.
-    Where the last one found is told with its χ², that is of this one alone. `shapes`: χ² in another shape, by the χ²
-    without; a fit to which another is added has one too then."""
-
-    def __init__(
-        self,
-        ranks: dict[tuple[str | float, ...], dict[str, float]],
-        together: Any,
-        shapes: dict[float, float] | None = None,
-    ) -> None:
-        short = SimpleNamespace(work=Work())
-        self.prepared: Any = SimpleNamespace(memory=1.0, felt=SimpleNamespace(late_s=0.0), sample_s=0.001, short=short)
-        self.samples, self.ranks, self.together, self.exchanges = NOISE, ranks, together, 0
-        self.shapes = shapes or {}
-
-    @property
-    def expected(self) -> float:
-        return NOISE
-
-    @property
-    def effective(self) -> float:
-        return NOISE
-
-    def ranked(self, now: Any, only: Any = None, least: float = 0.0) -> list[Any]:
-        ids = tuple(c.id for c in now.structure.causes)
-        found = self.ranks.get((*ids, now.chi2), self.ranks.get(ids, {}))
-        return [SimpleNamespace(id=i, fit=fit(chi2, *ids, i), score=chi2) for i, chi2 in found.items()]
-
-    def _felt(self, path: Any) -> None:
-        """There are no data."""
-
-    def _late_by_chance(self, path: Any, fit: Any) -> bool:
-        return False
-
-    def _compare(self, path: Any) -> None:
-        """The same."""
-
-    def settled(self, now: Any, joined: Any) -> Any:
-        return now
-
-    def recurved(self, now: Any) -> Any:
-        return fit(self.shapes.get(now.chi2, now.chi2), *(c.id for c in now.structure.causes))
-
-    def _shaped(self, trial: Any) -> Any:
-        chi2 = self.shapes.get(trial.fit.chi2, trial.fit.chi2)
-        return SimpleNamespace(id=trial.id, fit=fit(chi2, *(c.id for c in trial.fit.structure.causes)), score=chi2)
-
-    def _carried(self, trial: Any, steps: int) -> Any:
-        return trial
-
-    def exchanged(self, path: Any) -> Any:
-        self.exchanges += 1
-        return self.together or path.fits[-1]
-
-    def judge(self, before: Any, after: Any, base: Any) -> Evidence:
-        delta = before.chi2 - after.chi2
-        share, of_left = delta / (base.chi2 - NOISE), delta / max(before.chi2 - NOISE, delta, 1e-9)
-        return Evidence(delta, delta, 1, 15.0, share, delta / NOISE, of_left, len(before.structure.causes))
-
-
-@pytest.fixture(autouse=True)
-def all_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "believable", lambda fit, prepared: True)
-    monkeypatch.setattr(module, "too_small", lambda fit, prepared: False)
-
-
+pytestmark = pytest.mark.usefixtures("all_are_believed")
 RANKS = {(): {"adhesion": 20e3, "cogging": 90e3}, ("adhesion",): {"force_drift": 12e3}}
-
-
-def named(search: Search) -> list[str]:
-    return [c.id for c in search.path(fit(3e6)).fits[-1].structure.causes]
 
 
 def test_where_a_second_cause_takes_little_but_much_is_left_two_others_may_stand_in_the_place_of_the_first():
@@ -190,43 +109,6 @@ def test_where_the_last_cause_has_another_shape_those_before_it_are_held_against
     search = Told(ranks, fit(2900.0, "cogging", "resonance"), {2900.0: 1010.0})
     assert named(search) == ["cogging", "resonance"]
     assert search.exchanges == 2, "as it came in, and in its shape"
-
-
-class OfAKind(Told):
-    """A search in which no one shape of a cause does what two of its kind do, which do it without a further cause."""
-
-    def _united(self, now: Any, beside: Any) -> Any:
-        return now
-
-    def _stays_beside(self, now: Any, reshaped: Any, further: Any) -> bool:
-        return False
-
-
-@pytest.mark.parametrize(
-    ("second", "after"),
-    [
-        (1050.0, ["resonance", "force_delay"]),  # a second resonance is worse than a delay, of as many numbers
-        (1025.0, ["resonance"]),  # it is as good
-    ],
-)
-def test_two_of_a_kind_do_not_stand_for_a_shape_where_one_other_cause_does_better(second, after):
-    ranks: Any = {(): {"resonance": 7000.0}, ("resonance",): {"force_delay": 1010.0, "resonance": second}}
-    assert named(OfAKind(ranks, None)) == after
-
-
-@pytest.mark.parametrize(
-    ("numbers", "second", "further", "simpler"),
-    [
-        ((3, 1), 1020.0, 1010.0, True),
-        ((3, 1), 1005.0, 1010.0, False),  # it leaves more
-        ((1, 3), 1050.0, 1010.0, False),  # it has more numbers
-        ((3, 1), 4020.0, 4010.0, False),  # much is left
-    ],
-)
-def test_a_cause_of_few_numbers_is_no_worse_than_a_second_of_a_kind(numbers, second, further, simpler):
-    now, two, other = fit(20e3, "set"), fit(second, "set", "set"), fit(further, "set", "offset")
-    two.free, other.free = numbers
-    assert OfAKind({}, None)._simpler(now, two, other) is simpler
 
 
 class Counting(Told):
@@ -383,52 +265,6 @@ def test_a_delay_beside_a_zero_that_strays_is_asked_what_it_takes_of_what_is_not
             assert least <= evidence.of_slow_force(data, biased, also, base) <= most
             assert evidence.of_slow_force(data, base, biased, base) == 0.0
             assert evidence.of_slow_force(data, fit(0.0, "friction"), also, base) == 0.0
-
-
-class Exchanging(Told):
-    """A search whose exchange is the real one; without one of its causes a fit leaves 50,000."""
-
-    exchanged = Search.exchanged
-    believed: Any = SimpleNamespace(causes=())
-    limit = False
-
-    def _without(self, now: Any, index: int) -> Any:
-        return fit(50e3, *(c.id for k, c in enumerate(now.structure.causes) if k != index))
-
-    def _penalty(self, now: Any) -> float:
-        return 0.0
-
-    def _a_limit(self, now: Any, index: int) -> bool:
-        return self.limit
-
-
-@pytest.mark.parametrize(
-    ("shapes", "after"),
-    [
-        ({8500.0: 2800.0}, ["force_bias", "backlash"]),
-        ({}, ["backlash", "cogging"]),
-        ({8500.0: 2800.0, 5000.0: 1000.0}, ["backlash", "cogging"]),
-    ],
-)
-def test_no_cause_goes_for_another_before_those_beside_it_have_had_their_best_shapes(shapes, after):
-    """Play of the wrong shape leaves what a cogging of many numbers takes in place of the bias."""
-    search = Exchanging({("backlash",): {"cogging": 5000.0}}, None, shapes)
-    path = Path([fit(200e3), fit(56e3, "force_bias"), fit(8500.0, "force_bias", "backlash")])
-    path.tried = [["force_bias", "cogging"], ["backlash"]]
-    assert [c.id for c in search.exchanged(path).structure.causes] == after
-
-
-@pytest.mark.parametrize(
-    ("limit", "beside", "after"),
-    [(True, 1105.0, "cogging"), (True, 1140.0, "force_bias"), (False, 1105.0, "force_bias")],
-)
-def test_a_cause_at_its_bound_gives_way_to_one_that_no_data_exclude(limit, beside, after):
-    """Within 25 of it: its limit is what the other cause is."""
-    search = Exchanging({("backlash",): {"cogging": beside}}, None)
-    search.limit = limit
-    path = Path([fit(200e3), fit(56e3, "force_bias"), fit(1100.0, "force_bias", "backlash")])
-    path.tried = [["force_bias", "cogging"], ["backlash"]]
-    assert after in {c.id for c in search.exchanged(path).structure.causes}
 
 
 @pytest.mark.parametrize(("std", "most"), [(0.02, 1.0), (0.5, 0.25), (5.0, 0.125), (float("nan"), 0.125)])

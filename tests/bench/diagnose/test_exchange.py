@@ -1,0 +1,141 @@
+"""When one cause stands in the place of another, by fits that are made up: an id and a χ²."""
+
+from __future__ import annotations
+
+import importlib
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from bench.diagnose.path import Measure, Path
+from bench.diagnose.search import Search
+from tests.bench.diagnose.told import NOISE, Told, fit, named
+
+pytestmark = pytest.mark.usefixtures("all_are_believed")
+
+
+class OfAKind(Told):
+    """A search in which no one shape of a cause does what two of its kind do, which do it without a further cause."""
+
+    def _united(self, now: Any, beside: Any) -> Any:
+        return now
+
+    def _stays_beside(self, now: Any, reshaped: Any, further: Any) -> bool:
+        return False
+
+
+@pytest.mark.parametrize(
+    ("second", "after"),
+    [
+        (1050.0, ["resonance", "force_delay"]),  # a second resonance is worse than a delay, of as many numbers
+        (1025.0, ["resonance"]),  # it is as good
+    ],
+)
+def test_two_of_a_kind_do_not_stand_for_a_shape_where_one_other_cause_does_better(second, after):
+    ranks: Any = {(): {"resonance": 7000.0}, ("resonance",): {"force_delay": 1010.0, "resonance": second}}
+    assert named(OfAKind(ranks, None)) == after
+
+
+@pytest.mark.parametrize(
+    ("numbers", "second", "further", "simpler"),
+    [
+        ((3, 1), 1020.0, 1010.0, True),
+        ((3, 1), 1005.0, 1010.0, False),  # it leaves more
+        ((1, 3), 1050.0, 1010.0, False),  # it has more numbers
+        ((3, 1), 4020.0, 4010.0, False),  # much is left
+    ],
+)
+def test_a_cause_of_few_numbers_is_no_worse_than_a_second_of_a_kind(numbers, second, further, simpler):
+    now, two, other = fit(20e3, "set"), fit(second, "set", "set"), fit(further, "set", "offset")
+    two.free, other.free = numbers
+    assert OfAKind({}, None)._simpler(now, two, other) is simpler
+
+
+class Exchanging(Told):
+    """A search whose exchange is the real one; without one of its causes a fit leaves 50,000."""
+
+    exchanged = Search.exchanged
+    believed: Any = SimpleNamespace(causes=())
+    limit = False
+
+    def ranked(self, now: Any, only: Any = None, least: float = 0.0) -> list[Any]:
+        return [t for t in super().ranked(now) if t.id in only]
+
+    def _without(self, now: Any, index: int) -> Any:
+        return fit(50e3, *(c.id for k, c in enumerate(now.structure.causes) if k != index))
+
+    def _penalty(self, now: Any) -> float:
+        return 0.0
+
+    def _a_limit(self, now: Any, index: int) -> bool:
+        return self.limit
+
+
+def stood(**chi2: float) -> list[list[Any]]:
+    """What stood beside each other as the first cause came in, best first; and the one that came after."""
+    turns = [fit(x, i) for i, x in chi2.items()], [fit(8500.0, next(iter(chi2)), "backlash")]
+    return [
+        [SimpleNamespace(id=f.structure.causes[-1].id, cause=f.structure.causes[-1], fit=f) for f in t] for t in turns
+    ]
+
+
+@pytest.mark.parametrize(("bias", "after"), [(70e3, "force_bias"), (150e3, "adhesion")])
+def test_one_that_stood_close_behind_is_tried_in_the_place_of_the_first_wherever_it_stood(bias, after):
+    """Seventh of seven: with 130,000 of the 144,000 that adhesion takes, and with 50,000."""
+    others = ["cogging", "permanent_set", "elastic_law", "contact_offset", "friction"]
+    search = Exchanging({("backlash",): {"force_bias": 1010.0}}, None)
+    path = Path([fit(200e3), fit(56e3, "adhesion"), fit(8500.0, "adhesion", "backlash")])
+    path.rivals = stood(adhesion=56e3, **dict.fromkeys(others, 60e3), force_bias=bias)
+    path.tried = [["adhesion", *others, "force_bias"], ["backlash"]]
+    assert {c.id for c in search.exchanged(path).structure.causes} == {after, "backlash"}
+
+
+@pytest.mark.parametrize(
+    ("shapes", "after"),
+    [
+        ({8500.0: 2800.0}, ["force_bias", "backlash"]),
+        ({}, ["backlash", "cogging"]),
+        ({8500.0: 2800.0, 5000.0: 1000.0}, ["backlash", "cogging"]),
+    ],
+)
+def test_no_cause_goes_for_another_before_those_beside_it_have_had_their_best_shapes(shapes, after):
+    """Play of the wrong shape leaves what a cogging of many numbers takes in place of the bias."""
+    search = Exchanging({("backlash",): {"cogging": 5000.0}}, None, shapes)
+    path = Path([fit(200e3), fit(56e3, "force_bias"), fit(8500.0, "force_bias", "backlash")])
+    path.tried, path.rivals = [["force_bias", "cogging"], ["backlash"]], stood(force_bias=56e3, cogging=190e3)
+    assert [c.id for c in search.exchanged(path).structure.causes] == after
+
+
+@pytest.mark.parametrize(
+    ("limit", "beside", "after"),
+    [(True, 1105.0, "cogging"), (True, 1140.0, "force_bias"), (False, 1105.0, "force_bias")],
+)
+def test_a_cause_at_its_bound_gives_way_to_one_that_no_data_exclude(limit, beside, after):
+    """Within 25 of it: its limit is what the other cause is."""
+    search = Exchanging({("backlash",): {"cogging": beside}}, None)
+    search.limit = limit
+    path = Path([fit(200e3), fit(56e3, "force_bias"), fit(1100.0, "force_bias", "backlash")])
+    path.tried, path.rivals = [["force_bias", "cogging"], ["backlash"]], stood(force_bias=56e3, cogging=190e3)
+    assert after in {c.id for c in search.exchanged(path).structure.causes}
+
+
+class Comparing(Exchanging):
+    """A search whose comparison at the end is the real one."""
+
+    _compare = Search._compare
+
+    def _trial(self, now: Any) -> Any:
+        return SimpleNamespace(id=now.structure.causes[-1].id, fit=now, score=now.chi2)
+
+
+@pytest.mark.parametrize(("ahead", "asked"), [(56e3, True), (100e3, False)])
+def test_one_that_stood_behind_another_is_compared_anew_beside_what_came_later(monkeypatch, ahead, asked):
+    """Of adhesion, in whose place a bias has come, the play beside it tells far more than stood there."""
+    monkeypatch.setattr(importlib.import_module("bench.diagnose.search"), "last", lambda f, id_: fit(f.chi2, id_))
+    search = Comparing({("backlash",): {"adhesion": 9e3}}, None)
+    path = Path([fit(200e3), fit(70e3, "force_bias"), fit(1010.0, "force_bias", "backlash")])
+    path.rivals = stood(adhesion=ahead, force_bias=70e3)
+    path.measures = [Measure(200e3, NOISE, NOISE, 1.0), Measure(70e3, NOISE, NOISE, 1.0)]
+    search._compare(path)
+    assert ("force_bias" in path.compared) is asked
