@@ -45,6 +45,7 @@ Mask = NDArray[np.bool_]
 
 TOLD = 0.002  # of what the belief leaves beyond the noise: what a fault of the channel adds at the least
 NO_NOISE = 0.1  # of the noise power: what turns its sign with each sample is taken for some times as much noise
+ENDED_EARLY = "the search ended with its work done: what is left may have a further cause, for which it did not look"
 RIVALS = 4  # models of the best single causes that are kept
 
 
@@ -186,7 +187,12 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         seconds=time.perf_counter() - begun,
         model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
         notes=list(m.notes),
-        doubts=[*doubts(m, search.believed.pad.pad, path.fits[0].pad), *prepared.said_of_noise, *_past(search)],
+        doubts=[
+            *doubts(m, search.believed.pad.pad, path.fits[0].pad),
+            *prepared.said_of_noise,
+            *_past(search),
+            *([ENDED_EARLY] if path.cut_short else []),
+        ],
         remainders=tests,
         name=m.name,
         seen_once=any(most_sure(all_effects()[c.id], c.form, search.reach.rich) < 1.0 for c in causes),

@@ -59,6 +59,9 @@ class Path:
     compared: dict[str, Stage] = field(default_factory=dict)
     """By id, a cause beside its rivals where the path has ended: of those that came in amid causes that have gone."""
 
+    cut_short: bool = False
+    """Whether the search's work was done before it could look for what is left."""
+
     def stage_of(self, id_: str) -> Stage | None:
         """Where a cause came in, or was compared anew."""
         if id_ in self.compared:

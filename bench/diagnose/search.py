@@ -55,7 +55,7 @@ SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
 LONG_WAVES = 3  # starts of a wave that is longer than those sought
 LATER_BY_CHANCE = 1.3  # times what was known of it
-MISFIT = 1.3  # times what noise leaves: then a cause that was found may have another shape
+MISFIT, GLARING = 1.3, 2.0  # times what noise leaves: then a cause that was found may have another shape, or is not all
 
 
 @dataclass
@@ -133,9 +133,10 @@ class Search(Shaping):
             now = self.work
             # a third cause is not begun where it would not be done with what is left: most often there is none
             will_take = now - turned_at if len(path.fits) > 2 else 0
-            # a second one is, where the first leaves much: with that alone the answer is none
-            needs_two = len(path.fits) == 2 and self._much_left(path)
+            # a second one is, where the first leaves much: with that alone the answer is none, or not all
+            needs_two = len(path.fits) == 2 and (self._much_left(path) or self._times_left(path) > GLARING)
             if now - begun + will_take >= MOST_WORK * (MORE_FOR_TWO if needs_two else 1.0):
+                path.cut_short = self._times_left(path) > MISFIT
                 break
             turned_at = now
             self._whitened(path)
@@ -162,6 +163,10 @@ class Search(Shaping):
         """Whether what was found leaves much of what the belief left beyond the noise."""
         base, end = path.fits[0].chi2, path.fits[-1].chi2
         return end - self.expected >= MUCH_LEFT * (base - self.expected)
+
+    def _times_left(self, path: Path) -> float:
+        """What was found leaves, in what noise leaves."""
+        return path.fits[-1].chi2 / self.expected
 
     def _from_another_first(self, path: Path, begun: int) -> Path | None:
         """The path to two causes from one that stood near the first, where the first leaves much and those two leave
@@ -230,7 +235,7 @@ class Search(Shaping):
         small = [t for t in tried if t.id not in present and too_small(t.fit, self.prepared)]
         beside = min((t for t in every if t.id in present), key=lambda t: t.fit.chi2, default=None)
         found = self._lead(path, ranked[0])
-        more = found.pays or path.fits[-1].chi2 > MISFIT * self.expected
+        more = found.pays or self._times_left(path) > MISFIT
         return _Turn([t.id for t in tried], ranked, small, beside, found, more)
 
     def _lead(self, path: Path, best: Trial) -> Evidence:

@@ -127,6 +127,35 @@ def test_where_nothing_is_left_a_search_ends():
     assert named(search) == ["cogging"] and search.turns == 2
 
 
+class Working(Told):
+    """A search that has done its work with the candidates of one turn."""
+
+    done = 0
+
+    @property
+    def work(self) -> int:
+        return self.done
+
+    def ranked(self, now: Any, only: Any = None, least: float = 0.0) -> list[Any]:
+        self.done += module.MOST_WORK
+        return super().ranked(now, only, least)
+
+
+@pytest.mark.parametrize(
+    ("left", "after", "cut_short"),
+    [
+        (2500.0, ["cogging", "force_bias"], False),  # of 177,000 little, and more than twice what noise leaves
+        (1900.0, ["cogging"], True),
+        (1200.0, ["cogging"], False),  # what is left may be chance
+    ],
+)
+def test_a_search_whose_work_is_done_goes_on_where_a_cause_must_be_missing_and_else_says_so(left, after, cut_short):
+    search = Working({(): {"cogging": left}, ("cogging",): {"force_bias": 1010.0}}, None)
+    path = search.path(fit(180e3))
+    assert [c.id for c in path.fits[-1].structure.causes] == after
+    assert path.cut_short is cut_short
+
+
 class Reshaping(Told):
     """A search in which friction, but for what stood behind it, is tried with the resonance in another shape too."""
 
