@@ -173,11 +173,11 @@ class Search(Shaping):
         nothing: of two that look like a third together, that one comes first. None: there is none."""
         if len(path.fits) < 2:
             return None
-        base, end, prepared = path.fits[0], path.fits[-1], self.prepared
+        end, prepared = path.fits[-1], self.prepared
         left = end.chi2 - self.expected
         if not self._much_left(path) or unexplained(end.chi2, self.expected) <= 0.0:
             return None
-        for near in self._near(base, path.rivals[0]):
+        for near in self._near(path.measures[0].before, path.rivals[0]):
             if self.work - begun >= MOST_WORK:
                 break
             first = self._carried(near, ALL)
@@ -393,7 +393,7 @@ class Search(Shaping):
             return ranked
         few = lead.fit.free - MANY_MORE
         own = (t for t in plain if t.id == lead.id and t.fit.free < few)
-        near = (t for t in self._near(path.fits[-1], ranked) if t.fit.free < few)
+        near = (t for t in self._near(path.fits[-1].chi2, ranked) if t.fit.free < few)
         asked = [*islice(own, 1), *islice(near, 1)]
         if not asked:
             return ranked
@@ -455,7 +455,7 @@ class Search(Shaping):
         own = len(self.believed.causes)
         for index in range(own, len(best.structure.causes)):
             stage = min(index - own, len(path.tried) - 1)
-            near = self._near(path.fits[stage], path.rivals[stage], MOST_NEAR)
+            near = self._near(path.measures[stage].before, path.rivals[stage], MOST_NEAR)
             rivals = [*path.tried[stage][:5], *(t.id for t in near), *path.tried[-1][:4]]
             if path.fits[-1].chi2 <= 1.05 * self.expected:
                 rivals = [t.id for t in near[:RIVALS]]

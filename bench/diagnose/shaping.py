@@ -59,10 +59,10 @@ class Shaping(Sieve):
         structure, x = reduced(fit, index)
         return refit(self.short, structure, x, 10, 1e-5)
 
-    def _near(self, before: Fit, ranked: Sequence[Trial], most: int = RIVALS) -> list[Trial]:
-        """Those that stood close behind the first of a stage, `most` at the most."""
-        gain = before.chi2 - ranked[0].fit.chi2
-        return [t for t in ranked[1 : 1 + most] if before.chi2 - t.fit.chi2 > CLOSE * gain]
+    def _near(self, before: float, ranked: Sequence[Trial], most: int = RIVALS) -> list[Trial]:
+        """Those that stood close behind the first of a stage, `most` at the most. `before`: χ² there."""
+        gain = before - ranked[0].fit.chi2
+        return [t for t in ranked[1 : 1 + most] if before - t.fit.chi2 > CLOSE * gain]
 
     def _shaped(self, trial: Trial) -> Trial:
         """A trial with that one of its causes in another form of which it gains most; its own cause stays the last."""
@@ -78,7 +78,7 @@ class Shaping(Sieve):
         them apart, or is a law drawn through points, and another comes in front so, or a further cause leaves next to
         nothing; or `anyway`."""
         best = ranked[0]
-        near = self._near(now, ranked)
+        near = self._near(now.chi2, ranked)
         # a curve through points is that of any other cause but for crumbs
         told = unexplained(best.fit.chi2, self.expected) > 0.0 or drawn(best)
         if not anyway and not (near and told):

@@ -72,12 +72,16 @@ class Exchanging(Told):
         return self.limit
 
 
-def stood(**chi2: float) -> list[list[Any]]:
-    """What stood beside each other as the first cause came in, best first; and the one that came after."""
-    turns = [fit(x, i) for i, x in chi2.items()], [fit(8500.0, next(iter(chi2)), "backlash")]
-    return [
+def came(first: str, left: float, **chi2: float) -> Path:
+    """A path from 200,000 to a cause that came first and to play, which leaves so much beside it. `chi2`: what stood
+    beside each other as the first came in, best first."""
+    fits = [fit(200e3), fit(chi2[first], first), fit(left, first, "backlash")]
+    turns = [fit(x, i) for i, x in chi2.items()], [fits[-1]]
+    stood = [
         [SimpleNamespace(id=f.structure.causes[-1].id, cause=f.structure.causes[-1], fit=f) for f in t] for t in turns
     ]
+    measures = [Measure(f.chi2, NOISE, NOISE, 1.0) for f in fits[:-1]]
+    return Path(fits, stood, [list(chi2), ["backlash"]], measures)
 
 
 @pytest.mark.parametrize(("bias", "after"), [(70e3, "force_bias"), (150e3, "adhesion")])
@@ -85,9 +89,7 @@ def test_one_that_stood_close_behind_is_tried_in_the_place_of_the_first_wherever
     """Seventh of seven: with 130,000 of the 144,000 that adhesion takes, and with 50,000."""
     others = ["cogging", "permanent_set", "elastic_law", "contact_offset", "friction"]
     search = Exchanging({("backlash",): {"force_bias": 1010.0}}, None)
-    path = Path([fit(200e3), fit(56e3, "adhesion"), fit(8500.0, "adhesion", "backlash")])
-    path.rivals = stood(adhesion=56e3, **dict.fromkeys(others, 60e3), force_bias=bias)
-    path.tried = [["adhesion", *others, "force_bias"], ["backlash"]]
+    path = came("adhesion", 8500.0, adhesion=56e3, **dict.fromkeys(others, 60e3), force_bias=bias)
     assert {c.id for c in search.exchanged(path).structure.causes} == {after, "backlash"}
 
 
@@ -102,8 +104,7 @@ def test_one_that_stood_close_behind_is_tried_in_the_place_of_the_first_wherever
 def test_no_cause_goes_for_another_before_those_beside_it_have_had_their_best_shapes(shapes, after):
     """Play of the wrong shape leaves what a cogging of many numbers takes in place of the bias."""
     search = Exchanging({("backlash",): {"cogging": 5000.0}}, None, shapes)
-    path = Path([fit(200e3), fit(56e3, "force_bias"), fit(8500.0, "force_bias", "backlash")])
-    path.tried, path.rivals = [["force_bias", "cogging"], ["backlash"]], stood(force_bias=56e3, cogging=190e3)
+    path = came("force_bias", 8500.0, force_bias=56e3, cogging=190e3)
     assert [c.id for c in search.exchanged(path).structure.causes] == after
 
 
@@ -115,8 +116,7 @@ def test_a_cause_at_its_bound_gives_way_to_one_that_no_data_exclude(limit, besid
     """Within 25 of it: its limit is what the other cause is."""
     search = Exchanging({("backlash",): {"cogging": beside}}, None)
     search.limit = limit
-    path = Path([fit(200e3), fit(56e3, "force_bias"), fit(1100.0, "force_bias", "backlash")])
-    path.tried, path.rivals = [["force_bias", "cogging"], ["backlash"]], stood(force_bias=56e3, cogging=190e3)
+    path = came("force_bias", 1100.0, force_bias=56e3, cogging=190e3)
     assert after in {c.id for c in search.exchanged(path).structure.causes}
 
 
@@ -134,8 +134,6 @@ def test_one_that_stood_behind_another_is_compared_anew_beside_what_came_later(m
     """Of adhesion, in whose place a bias has come, the play beside it tells far more than stood there."""
     monkeypatch.setattr(importlib.import_module("bench.diagnose.search"), "last", lambda f, id_: fit(f.chi2, id_))
     search = Comparing({("backlash",): {"adhesion": 9e3}}, None)
-    path = Path([fit(200e3), fit(70e3, "force_bias"), fit(1010.0, "force_bias", "backlash")])
-    path.rivals = stood(adhesion=ahead, force_bias=70e3)
-    path.measures = [Measure(200e3, NOISE, NOISE, 1.0), Measure(70e3, NOISE, NOISE, 1.0)]
+    path = came("force_bias", 1010.0, adhesion=ahead, force_bias=70e3)
     search._compare(path)
     assert ("force_bias" in path.compared) is asked
