@@ -50,7 +50,7 @@ LESS = 0.1  # of what those leave, that two in their place leave
 MISSED, SHAPED = 0.75, 2  # of what a further cause takes, that it took in the shape in which it came in; and how many
 # rivals are asked for their shapes then
 MOST_CAUSES = 3
-MOST_NEAR = 8  # that stood close behind a cause, and are tried in its place
+MOST_NEAR = 8  # that stood close behind a cause with no more numbers, and are tried in its place
 SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
 LONG_WAVES = 3  # starts of a wave that is longer than those sought
@@ -455,8 +455,10 @@ class Search(Shaping):
         own = len(self.believed.causes)
         for index in range(own, len(best.structure.causes)):
             stage = min(index - own, len(path.tried) - 1)
-            near = self._near(path.measures[stage].before, path.rivals[stage], MOST_NEAR)
-            rivals = [*path.tried[stage][:5], *(t.id for t in near), *path.tried[-1][:4]]
+            stood = path.rivals[stage]
+            near = self._near(path.measures[stage].before, stood, MOST_NEAR)
+            plain = [t.id for t in near if t.fit.free <= stood[0].fit.free]
+            rivals = [*path.tried[stage][:5], *plain, *path.tried[-1][:4]]
             if path.fits[-1].chi2 <= 1.05 * self.expected:
                 rivals = [t.id for t in near[:RIVALS]]
             present = {c.id for c in best.structure.causes}

@@ -84,12 +84,20 @@ def came(first: str, left: float, **chi2: float) -> Path:
     return Path(fits, stood, [list(chi2), ["backlash"]], measures)
 
 
-@pytest.mark.parametrize(("bias", "after"), [(70e3, "force_bias"), (150e3, "adhesion")])
-def test_one_that_stood_close_behind_is_tried_in_the_place_of_the_first_wherever_it_stood(bias, after):
-    """Seventh of seven: with 130,000 of the 144,000 that adhesion takes, and with 50,000."""
+@pytest.mark.parametrize(
+    ("bias", "numbers", "after"),
+    [
+        (70e3, 1, "force_bias"),
+        (150e3, 1, "adhesion"),  # 50,000 of 144,000 are not close
+        (70e3, 3, "adhesion"),  # it has more numbers
+    ],
+)
+def test_one_that_stood_close_behind_is_tried_in_the_place_of_the_first_wherever_it_stood(bias, numbers, after):
+    """Seventh of seven, with 130,000 of the 144,000 that adhesion takes."""
     others = ["cogging", "permanent_set", "elastic_law", "contact_offset", "friction"]
     search = Exchanging({("backlash",): {"force_bias": 1010.0}}, None)
     path = came("adhesion", 8500.0, adhesion=56e3, **dict.fromkeys(others, 60e3), force_bias=bias)
+    path.rivals[0][-1].fit.free = numbers
     assert {c.id for c in search.exchanged(path).structure.causes} == {after, "backlash"}
 
 
