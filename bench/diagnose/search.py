@@ -323,8 +323,8 @@ class Search(Shaping):
                 continue
             came, beside, then = stage
             amid = not {c.id for c in came.fit.structure.causes} <= set(named)
-            room = RIVAL * max(came.fit.chi2 / self.expected, then.memory)
-            amid |= any(t.fit.chi2 < came.fit.chi2 - room for t in beside if t.id not in named)
+            surely = came.fit.chi2 - self._no_rival(came.fit, then.memory)
+            amid |= any(t.fit.chi2 < surely for t in beside if t.id not in named)
             other = index > own and came.cause.form.name != final.structure.causes[index].form.name
             if not (amid or other):
                 continue
@@ -457,10 +457,11 @@ class Search(Shaping):
             stage = min(index - own, len(path.tried) - 1)
             stood = path.rivals[stage]
             near = self._near(path.measures[stage].before, stood, MOST_NEAR)
-            plain = [t.id for t in near if t.fit.free <= stood[0].fit.free]
-            rivals = [*path.tried[stage][:5], *plain, *path.tried[-1][:4]]
-            if path.fits[-1].chi2 <= 1.05 * self.expected:
+            if self._times_left(path) <= 1.05:
                 rivals = [t.id for t in near[:RIVALS]]
+            else:
+                plain = [t.id for t in near if t.fit.free <= stood[0].fit.free]
+                rivals = [*path.tried[stage][:5], *plain, *path.tried[-1][:4]]
             present = {c.id for c in best.structure.causes}
             rivals = [r for r in dict.fromkeys(rivals) if r not in present]
             if not rivals:

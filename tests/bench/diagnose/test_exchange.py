@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from types import SimpleNamespace
 from typing import Any
 
@@ -140,7 +139,7 @@ class Comparing(Exchanging):
 @pytest.mark.parametrize(("ahead", "asked"), [(56e3, True), (100e3, False)])
 def test_one_that_stood_behind_another_is_compared_anew_beside_what_came_later(monkeypatch, ahead, asked):
     """Of adhesion, in whose place a bias has come, the play beside it tells far more than stood there."""
-    monkeypatch.setattr(importlib.import_module("bench.diagnose.search"), "last", lambda f, id_: fit(f.chi2, id_))
+    monkeypatch.setattr("bench.diagnose.search.last", lambda f, id_: fit(f.chi2, id_))
     search = Comparing({("backlash",): {"adhesion": 9e3}}, None)
     path = came("force_bias", 1010.0, adhesion=ahead, force_bias=70e3)
     search._compare(path)
