@@ -218,9 +218,9 @@ def beyond_limit(data: Data, fit: Fit) -> Mask:
     if index is None:
         return np.zeros(data.size, dtype=bool)
     limit_N = fit.structure.values(fit.x)[index]["limit"]
-    force = force_at(data, *reduced(fit, index))
-    one_sided = fit.structure.causes[index].form.name in ("upper", "stop", "folding")
-    return np.asarray((force if one_sided else np.abs(force)) > limit_N)
+    unlimited, limited = force_at(data, *reduced(fit, index)), force_at(data, fit.structure, fit.x)
+    # what a limit of one side alone leaves as it is tells of the pad
+    return np.asarray((np.abs(unlimited) > limit_N) & (limited != unlimited))
 
 
 def held_back(prepared: Prepared, fit: Fit, flags: Faults) -> Mask:

@@ -30,7 +30,7 @@ from .path import Measure, Path, Trial
 from .refit import Fit, last, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import families
-from .shaping import RIVALS, Shaping
+from .shaping import RIVALS, Shaping, no_rival
 from .sieve import ALL, BETTER, COMPARED, MORE
 
 Array = NDArray[np.float64]
@@ -323,7 +323,7 @@ class Search(Shaping):
                 continue
             came, beside, then = stage
             amid = not {c.id for c in came.fit.structure.causes} <= set(named)
-            surely = came.fit.chi2 - self._no_rival(came.fit, then.memory)
+            surely = came.fit.chi2 - no_rival(came.fit, then.expected, then.memory)
             amid |= any(t.fit.chi2 < surely for t in beside if t.id not in named)
             other = index > own and came.cause.form.name != final.structure.causes[index].form.name
             if not (amid or other):

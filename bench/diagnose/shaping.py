@@ -155,14 +155,9 @@ class Shaping(Sieve):
         """Whether a further cause leaves next to nothing of what a fit leaves, and is better than a second one of a
         kind, or as good with fewer numbers: what two of a kind can do together tells nothing of its shape."""
         better = reshaped.chi2 - further.chi2
-        surely = better > self._no_rival(further, self.prepared.memory)
+        surely = better > no_rival(further, self.expected, self.prepared.memory)
         no_worse = further.free < reshaped.free or (further.free == reshaped.free and surely)
         return better >= 0.0 and no_worse and further.chi2 - self.expected < LITTLE * (now.chi2 - self.expected)
-
-    def _no_rival(self, fit: Fit, memory: float) -> float:
-        """Δχ² by which a fit must be better or worse than another, or neither excludes the other: what it leaves counts
-        as noise."""
-        return RIVAL * max(fit.chi2 / self.expected, memory)
 
     def _alone_clean(self, before: float, after: float, reshaped: float) -> bool:
         """Whether a further cause leaves nothing, and another shape of a cause found something beyond chance."""
@@ -172,3 +167,9 @@ class Shaping(Sieve):
     def _clean(self, before: float, after: float) -> bool:
         """Whether a fit leaves nothing of what was left before. Both are χ²."""
         return after - self.expected < max(CLEAN * (before - self.expected), float(np.sqrt(2.0 * self.expected)))
+
+
+def no_rival(fit: Fit, expected: float, memory: float) -> float:
+    """Δχ² by which a fit must be better or worse than another, or neither excludes the other: what it leaves counts as
+    noise. `expected`, `memory`: of the data that its χ² is of."""
+    return RIVAL * max(fit.chi2 / expected, memory)

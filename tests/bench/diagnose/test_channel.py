@@ -278,14 +278,18 @@ def test_what_is_left_below_a_ceiling_is_not_the_lower_half_of_its_noise():
 
 
 def test_samples_beyond_a_limit_that_was_fitted_are_told():
-    time, depth = np.arange(500) * 0.01, np.linspace(0.0, 2.0, 500)
+    """Of a limit of one side alone there is none on the other."""
+    time, depth = np.arange(1000) * 0.01, np.linspace(0.0, 5.0, 1000)
     pad = PadNumbers(Pad(Exponential(3.0, 0.0), Relaxation(), unilateral=True), 2.0, 6.0)
-    data = Data(time, depth, 3.0 * depth, np.ones(500), np.full(500, 0.01), np.zeros(500, dtype=np.intp))
-    for form in ("hard", "upper", "stop"):
-        limit = cause_of(effect("saturation"), effect("saturation").form(form), {"limit": 4.5})
-        structure = Structure(pad, (limit,))
-        fit = Fit(structure, structure.x(pad.x()), 0.0, np.eye(3), True)
-        assert np.array_equal(beyond_limit(data, fit), 3.0 * depth > 4.5)
+    bias = cause_of(effect("force_bias"), effect("force_bias").form("constant"), {"bias": -9.0})
+    force = 3.0 * depth - 9.0
+    data = Data(time, depth, force, np.ones(1000), np.full(1000, 0.01), np.zeros(1000, dtype=np.intp))
+    for form in effect("saturation").forms:
+        limit = cause_of(effect("saturation"), form, {"limit": 4.5})
+        structure = Structure(pad, (bias, limit))
+        fit = Fit(structure, structure.x(pad.x()), 0.0, np.eye(4), True)
+        both = form.name in ("hard", "soft", "compressing")
+        assert np.array_equal(beyond_limit(data, fit), (np.abs(force) if both else force) > 4.5), form.name
         assert not beyond_limit(data, Fit(Structure(pad), pad.x(), 0.0, np.eye(2), True)).any()
 
 

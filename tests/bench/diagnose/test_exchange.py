@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -142,5 +143,16 @@ def test_one_that_stood_behind_another_is_compared_anew_beside_what_came_later(m
     monkeypatch.setattr("bench.diagnose.search.last", lambda f, id_: fit(f.chi2, id_))
     search = Comparing({("backlash",): {"adhesion": 9e3}}, None)
     path = came("force_bias", 1010.0, adhesion=ahead, force_bias=70e3)
+    search._compare(path)
+    assert ("force_bias" in path.compared) is asked
+
+
+@pytest.mark.parametrize(("noise", "asked"), [(4000.0, True), (1000.0, False)])
+def test_what_stood_ahead_is_told_by_what_noise_left_there(monkeypatch, noise, asked):
+    """χ² of before the noise's colour was taken in: noise alone left four times as much."""
+    monkeypatch.setattr("bench.diagnose.search.last", lambda f, id_: fit(f.chi2, id_))
+    search = Comparing({("backlash",): {"adhesion": 9e3}}, None)
+    path = came("force_bias", 1010.0, adhesion=6.9e3, force_bias=7e3)
+    path.measures = [replace(m, expected=noise) for m in path.measures]
     search._compare(path)
     assert ("force_bias" in path.compared) is asked
