@@ -23,15 +23,15 @@ from .candidates import (
 )
 from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
+from .exchange import Exchange
 from .felt_errors import felt_errors, redrawn
 from .late_by_chance import late_by_chance_s
 from .numbers import shapes_of
 from .path import Measure, Path, Trial
-from .refit import Fit, last, mean_square, reduced, refit
+from .refit import Fit, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import families
-from .shaping import RIVALS, Shaping, no_rival
-from .sieve import ALL, BETTER, COMPARED, MORE
+from .sieve import ALL, MORE
 
 Array = NDArray[np.float64]
 
@@ -42,15 +42,11 @@ MOST_WORK = 150_000_000  # simulated samples, after which no further cause is lo
 MORE_FOR_TWO = 2.0  # times those, where the first of two leaves much
 A_SHAPE = 0.1  # of what is left beyond the noise, that another shape of a cause takes where no further cause pays
 HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
-NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MUCH_LEFT, A_PART = 0.03, 0.05  # of what the belief leaves beyond the noise, that a first cause and all that follow it
 # leave; and what the lesser of two in its place takes, or of what was held out all that begins with another
 GOOD_PART, OTHERS = 0.4, 2  # of what a first cause takes, that others take; so many are tried where it was none
 LESS = 0.1  # of what those leave, that two in their place leave
-MISSED, SHAPED = 0.75, 2  # of what a further cause takes, that it took in the shape in which it came in; and how many
-# rivals are asked for their shapes then
 MOST_CAUSES = 3
-MOST_NEAR = 8  # that stood close behind a cause with no more numbers, and are tried in its place
 SEED = 0
 MOST_SHAPES = 12  # of a believed cause, that are tried
 LONG_WAVES = 3  # starts of a wave that is longer than those sought
@@ -74,7 +70,7 @@ class _Turn:
     """What is missed is of the shape of a cause that was found, and no form has it."""
 
 
-class Search(Shaping):
+class Search(Exchange):
     """One search on one measurement."""
 
     @cached_property
@@ -122,6 +118,7 @@ class Search(Shaping):
         begun = self.work
         path = self._walked(Path([base]), begun)
         path = self._from_another_first(path, begun) or path
+        self._wave_for_a_law(path)
         self._compare(path)
         return path
 
@@ -163,10 +160,6 @@ class Search(Shaping):
         """Whether what was found leaves much of what the belief left beyond the noise."""
         base, end = path.fits[0].chi2, path.fits[-1].chi2
         return end - self.expected >= MUCH_LEFT * (base - self.expected)
-
-    def _times_left(self, path: Path) -> float:
-        """What was found leaves, in what noise leaves."""
-        return path.fits[-1].chi2 / self.expected
 
     def _from_another_first(self, path: Path, begun: int) -> Path | None:
         """The path to two causes from one that stood near the first, where the first leaves much and those two leave
@@ -310,38 +303,6 @@ class Search(Shaping):
         others = sorted([wave, *(t for t in ranked[1:] if t is not known)], key=lambda t: t.score)
         return [ranked[0], *others]
 
-    def _compare(self, path: Path) -> None:
-        """Causes that came in amid others which have gone since, or behind one, or in another shape that missed much of
-        what they take, beside what stood near them there, where the path has ended: the others' errors, and those of a
-        shape, tell nothing of how sure their names are."""
-        final = path.fits[-1]
-        own = len(path.fits[0].structure.causes)
-        named = [c.id for c in final.structure.causes]
-        for index in range(own, len(named)):
-            stage = path.stage_of(named[index])
-            if stage is None:
-                continue
-            came, beside, then = stage
-            amid = not {c.id for c in came.fit.structure.causes} <= set(named)
-            surely = came.fit.chi2 - no_rival(came.fit, then.expected, then.memory)
-            amid |= any(t.fit.chi2 < surely for t in beside if t.id not in named)
-            other = index > own and came.cause.form.name != final.structure.causes[index].form.name
-            if not (amid or other):
-                continue
-            without = self._without(final, index)
-            missed = then.before - came.fit.chi2 < MISSED * (without.chi2 - final.chi2)
-            if not (amid or missed):
-                continue
-            near = [i for i in dict.fromkeys(t.id for t in (*beside, *path.rivals[0])) if i not in named][:COMPARED]
-            now = self._trial(last(final, named[index]))
-            rivals = self.ranked(without, only=near)
-            if not amid:
-                rivals = sorted(
-                    (self._shaped(t) if k < SHAPED else t for k, t in enumerate(rivals)), key=lambda t: t.score
-                )
-            measure = Measure(without.chi2, self.expected, self.effective, self.prepared.memory)
-            path.compared[now.id] = (now, rivals, measure)
-
     def _added(self, path: Path, turn: _Turn) -> bool:
         """Whether the turn's first cause pays, or would with earlier ones exchanged: then it is at the path's end."""
         now = path.fits[-1]
@@ -446,50 +407,3 @@ class Search(Shaping):
             before, after, base = (refit(data, fit.structure, fit.x, 8, 1e-6) for fit in (before, after, base))
         slow = of_slow_force(data, before, after, base)
         return evidence_of(before, after, base, self.prepared.memory, self.samples, self.expected, slow)
-
-    def exchanged(self, path: Path) -> Fit:
-        """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
-        out. Where nothing is left, those alone that stood near: what made them worse may have been the other cause."""
-        best, told = path.fits[-1], False
-        score = self._to_beat(best)
-        own = len(self.believed.causes)
-        for index in range(own, len(best.structure.causes)):
-            stage = min(index - own, len(path.tried) - 1)
-            stood = path.rivals[stage]
-            near = self._near(path.measures[stage].before, stood, MOST_NEAR)
-            if self._times_left(path) <= 1.05:
-                rivals = [t.id for t in near[:RIVALS]]
-            else:
-                plain = [t.id for t in near if t.fit.free <= stood[0].fit.free]
-                rivals = [*path.tried[stage][:5], *plain, *path.tried[-1][:4]]
-            present = {c.id for c in best.structure.causes}
-            rivals = [r for r in dict.fromkeys(rivals) if r not in present]
-            if not rivals:
-                continue
-            without = self._without(best, index)
-            if without.chi2 < best.chi2:  # it was in the way
-                return refit(self.short, without.structure, without.x, ALL, 1e-8)
-            room = RIVAL * self.prepared.memory if self._a_limit(best, index) else 0.0
-            for trial in self.ranked(without, only=rivals)[:1]:
-                gained = without.chi2 - trial.fit.chi2
-                shaped, worse = trial, trial.score >= score + room
-                if worse and gained > NEARLY * (without.chi2 - best.chi2):
-                    shaped = self._told(trial)
-                asked = shaped is not trial or (not worse and unexplained(best.chi2, self.expected) > 0.0)
-                if asked and not told:  # shapes against shapes
-                    best, told = self.recurved(best), True
-                    score = self._to_beat(best)
-                    if shaped is trial and trial.score >= score + room:
-                        shaped = self._told(trial)
-                trial = shaped
-                if trial.score < score + room and believable(trial.fit, self.prepared):
-                    best, score = trial.fit, self._to_beat(trial.fit)
-        return best
-
-    def _a_limit(self, fit: Fit, index: int) -> bool:
-        """Whether a cause is at a bound: then it is another's limit, as what came in beside it has shown."""
-        return not believable(last(fit, fit.structure.causes[index].id), self.prepared)
-
-    def _to_beat(self, fit: Fit) -> float:
-        """The score below which another fit is better by more than what both leave."""
-        return fit.chi2 + self._penalty(fit) - BETTER * max(fit.chi2 / self.expected, 1.0)

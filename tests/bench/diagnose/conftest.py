@@ -8,4 +8,5 @@ import pytest
 @pytest.fixture
 def all_are_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bench.diagnose.search.believable", lambda fit, prepared: True)
+    monkeypatch.setattr("bench.diagnose.exchange.believable", lambda fit, prepared: True)
     monkeypatch.setattr("bench.diagnose.search.too_small", lambda fit, prepared: False)

@@ -8,8 +8,10 @@ from typing import Any
 
 import pytest
 
+from bench.diagnose.numbers import cause_of
 from bench.diagnose.path import Measure, Path
 from bench.diagnose.search import Search
+from sim.effects import effect
 from tests.bench.diagnose.told import NOISE, Told, fit, named
 
 pytestmark = pytest.mark.usefixtures("all_are_believed")
@@ -140,7 +142,7 @@ class Comparing(Exchanging):
 @pytest.mark.parametrize(("ahead", "asked"), [(56e3, True), (100e3, False)])
 def test_one_that_stood_behind_another_is_compared_anew_beside_what_came_later(monkeypatch, ahead, asked):
     """Of adhesion, in whose place a bias has come, the play beside it tells far more than stood there."""
-    monkeypatch.setattr("bench.diagnose.search.last", lambda f, id_: fit(f.chi2, id_))
+    monkeypatch.setattr("bench.diagnose.exchange.last", lambda f, id_: fit(f.chi2, id_))
     search = Comparing({("backlash",): {"adhesion": 9e3}}, None)
     path = came("force_bias", 1010.0, adhesion=ahead, force_bias=70e3)
     search._compare(path)
@@ -150,9 +152,46 @@ def test_one_that_stood_behind_another_is_compared_anew_beside_what_came_later(m
 @pytest.mark.parametrize(("noise", "asked"), [(4000.0, True), (1000.0, False)])
 def test_what_stood_ahead_is_told_by_what_noise_left_there(monkeypatch, noise, asked):
     """χ² of before the noise's colour was taken in: noise alone left four times as much."""
-    monkeypatch.setattr("bench.diagnose.search.last", lambda f, id_: fit(f.chi2, id_))
+    monkeypatch.setattr("bench.diagnose.exchange.last", lambda f, id_: fit(f.chi2, id_))
     search = Comparing({("backlash",): {"adhesion": 9e3}}, None)
     path = came("force_bias", 1010.0, adhesion=6.9e3, force_bias=7e3)
     path.measures = [replace(m, expected=noise) for m in path.measures]
     search._compare(path)
     assert ("force_bias" in path.compared) is asked
+
+
+class Drawing(Comparing):
+    """A search in which a law is drawn through points, or is a formula, and an encoder's error is a wave."""
+
+    def __init__(self, chi2: float, law: str) -> None:
+        super().__init__({("backlash",): {"encoder_error": chi2}}, None)
+        self.law = law
+
+    def _trial(self, now: Any) -> Any:
+        which = effect(now.structure.causes[-1].id)
+        form = which.form(self.law) if which.id == "elastic_law" else which.forms[0]
+        return SimpleNamespace(id=which.id, cause=cause_of(which, form), fit=now, score=now.chi2)
+
+    def ranked(self, now: Any, only: Any = None, least: float = 0.0) -> list[Any]:
+        return [self._trial(t.fit) for t in super().ranked(now, only)]
+
+    def _shaped(self, trial: Any) -> Any:
+        return trial
+
+
+@pytest.mark.parametrize(
+    ("chi2", "law", "after"),
+    [
+        (1450.0, "fine_spline", "encoder_error"),  # all but a hundredth of what the law takes
+        (1550.0, "fine_spline", "elastic_law"),
+        (1450.0, "exponential", "elastic_law"),  # few numbers tell a law
+    ],
+)
+def test_a_law_through_points_is_a_wave_once_what_else_there_is_stands_beside_it(monkeypatch, chi2, law, after):
+    """Without either the play alone leaves 50,000."""
+    monkeypatch.setattr("bench.diagnose.exchange.last", lambda f, id_: fit(f.chi2, "backlash", id_))
+    path = came("elastic_law", 1000.0, elastic_law=60e3)
+    search = Drawing(chi2, law)
+    search._wave_for_a_law(path)
+    assert after in {c.id for c in path.fits[-1].structure.causes}
+    assert ("encoder_error" in path.compared) is (after == "encoder_error")

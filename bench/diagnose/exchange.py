@@ -1,0 +1,121 @@
+"""Causes found that go for others: those that stood near one are tried in its place once more is known."""
+
+from __future__ import annotations
+
+from .evidence import RIVAL, believable, unexplained
+from .path import Measure, Path
+from .refit import Fit, last, refit
+from .shaping import RIVALS, Shaping, no_rival
+from .sieve import ALL, BETTER, COMPARED, drawn, plainer_first
+
+NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
+MISSED, SHAPED = 0.75, 2  # of what a further cause takes, that it took in the shape in which it came in; and how many
+# rivals are asked for their shapes then
+MOST_NEAR = 8  # that stood close behind a cause with no more numbers, and are tried in its place
+
+
+class Exchange(Shaping):
+    """Causes of a path in the place of each other."""
+
+    def exchanged(self, path: Path) -> Fit:
+        """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
+        out. Where nothing is left, those alone that stood near: what made them worse may have been the other cause."""
+        best, told = path.fits[-1], False
+        score = self._to_beat(best)
+        own = len(self.believed.causes)
+        for index in range(own, len(best.structure.causes)):
+            stage = min(index - own, len(path.tried) - 1)
+            stood = path.rivals[stage]
+            near = self._near(path.measures[stage].before, stood, MOST_NEAR)
+            if self._times_left(path) <= 1.05:
+                rivals = [t.id for t in near[:RIVALS]]
+            else:
+                plain = [t.id for t in near if t.fit.free <= stood[0].fit.free]
+                rivals = [*path.tried[stage][:5], *plain, *path.tried[-1][:4]]
+            present = {c.id for c in best.structure.causes}
+            rivals = [r for r in dict.fromkeys(rivals) if r not in present]
+            if not rivals:
+                continue
+            without = self._without(best, index)
+            if without.chi2 < best.chi2:  # it was in the way
+                return refit(self.short, without.structure, without.x, ALL, 1e-8)
+            room = RIVAL * self.prepared.memory if self._a_limit(best, index) else 0.0
+            for trial in self.ranked(without, only=rivals)[:1]:
+                gained = without.chi2 - trial.fit.chi2
+                shaped, worse = trial, trial.score >= score + room
+                if worse and gained > NEARLY * (without.chi2 - best.chi2):
+                    shaped = self._told(trial)
+                asked = shaped is not trial or (not worse and unexplained(best.chi2, self.expected) > 0.0)
+                if asked and not told:  # shapes against shapes
+                    best, told = self.recurved(best), True
+                    score = self._to_beat(best)
+                    if shaped is trial and trial.score >= score + room:
+                        shaped = self._told(trial)
+                trial = shaped
+                if trial.score < score + room and believable(trial.fit, self.prepared):
+                    best, score = trial.fit, self._to_beat(trial.fit)
+        return best
+
+    def _a_limit(self, fit: Fit, index: int) -> bool:
+        """Whether a cause is at a bound: then it is another's limit, as what came in beside it has shown."""
+        return not believable(last(fit, fit.structure.causes[index].id), self.prepared)
+
+    def _to_beat(self, fit: Fit) -> float:
+        """The score below which another fit is better by more than what both leave."""
+        return fit.chi2 + self._penalty(fit) - BETTER * max(fit.chi2 / self.expected, 1.0)
+
+    def _times_left(self, path: Path) -> float:
+        """What was found leaves, in what noise leaves."""
+        return path.fits[-1].chi2 / self.expected
+
+    def _wave_for_a_law(self, path: Path) -> None:
+        """At a path's end an error of the position that repeats, in the place of a law through points, where that is
+        all that the law does beside the other causes: which of the two is told once those are there."""
+        final = path.fits[-1]
+        own, causes = len(path.fits[0].structure.causes), final.structure.causes
+        index = next((k for k, c in enumerate(causes) if k >= own and c.id == "elastic_law"), None)
+        if index is None or len(causes) < own + 2:
+            return
+        law = self._trial(last(final, "elastic_law"))
+        if not drawn(law) or any(c.id == "encoder_error" for c in causes):
+            return
+        without = self._without(final, index)
+        beside = [self._shaped(t) for t in self.ranked(without, only=["encoder_error"])]
+        wave = plainer_first(without, [law, *beside])[0]
+        if wave is law or not believable(wave.fit, self.prepared):
+            return
+        path.fits[-1] = wave.fit
+        measure = Measure(without.chi2, self.expected, self.effective, self.prepared.memory)
+        path.compared[wave.id] = (wave, [law], measure)
+
+    def _compare(self, path: Path) -> None:
+        """Causes that came in amid others which have gone since, or behind one, or in another shape that missed much of
+        what they take, beside what stood near them there, where the path has ended: the others' errors, and those of a
+        shape, tell nothing of how sure their names are."""
+        final = path.fits[-1]
+        own = len(path.fits[0].structure.causes)
+        named = [c.id for c in final.structure.causes]
+        for index in range(own, len(named)):
+            stage = path.stage_of(named[index])
+            if stage is None:
+                continue
+            came, beside, then = stage
+            amid = not {c.id for c in came.fit.structure.causes} <= set(named)
+            surely = came.fit.chi2 - no_rival(came.fit, then.expected, then.memory)
+            amid |= any(t.fit.chi2 < surely for t in beside if t.id not in named)
+            other = index > own and came.cause.form.name != final.structure.causes[index].form.name
+            if not (amid or other):
+                continue
+            without = self._without(final, index)
+            missed = then.before - came.fit.chi2 < MISSED * (without.chi2 - final.chi2)
+            if not (amid or missed):
+                continue
+            near = [i for i in dict.fromkeys(t.id for t in (*beside, *path.rivals[0])) if i not in named][:COMPARED]
+            now = self._trial(last(final, named[index]))
+            rivals = self.ranked(without, only=near)
+            if not amid:
+                rivals = sorted(
+                    (self._shaped(t) if k < SHAPED else t for k, t in enumerate(rivals)), key=lambda t: t.score
+                )
+            measure = Measure(without.chi2, self.expected, self.effective, self.prepared.memory)
+            path.compared[now.id] = (now, rivals, measure)
