@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim import axis_kernel as a
-from sim.kernel import Array, as_vector
+from sim.kernel import as_vector
 from sim.model import Model
+from sim.slots import Array
 
 GRAVITY_M_S2 = 9.80665
 STREAM_GAP_S = 0.05

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.jit import compiled, pointer
-from sim.kernel import SENSOR, chain, plant_step
+from sim.kernel import plant_step
+from sim.slots import SENSOR, chain
 
 Array = NDArray[np.float64]
 Program = NDArray[np.int64]

@@ -1,7 +1,6 @@
 """The compiled loop of the plant: one step, and the same step over arrays.
 
-A plant is a *program* (int64: sizes, then the blocks by place), its *parameters* and its *state* (float64); see
-sim/program.py for how they are laid out. One step, from motor side to load cell:
+Of a plant's program, parameters and state (sim/slots.py). One step, from motor side to load cell:
 
     x ─ play ─►(+)─► y ─ depth ─► δ ─ law·elastic ─► F^e ─ relaxation ─► + contact, gap ─► F_pad ─► + load(F_pad),
                 ▲ −                                                                              probe(y) ─► F_cell
@@ -17,46 +16,56 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.jit import call_block, compiled, pointer
-
-Array = NDArray[np.float64]
-Program = NDArray[np.int64]
-Ints = Program  # inside the loop these are bare pointers
-Doubles = Array
-
-PLACES = (
-    "report",
-    "play",
-    "frame",
-    "probe",
-    "depth",
-    "law",
-    "elastic",
-    "rate",
-    "contact",
-    "gap",
-    "load",
-    "sensor",
-    "sampling",
+from sim.slots import (
+    BONDED,
+    CACHE,
+    CELL,
+    CONTACT,
+    DEPTH,
+    ELASTIC,
+    FE,
+    FILM,
+    FRAME,
+    GAP,
+    INNER,
+    INNER_SIZE,
+    LAW,
+    LOAD,
+    MODES,
+    ONCE,
+    PAD_DEPTH,
+    PAD_FORCE,
+    PLAY,
+    PROBE,
+    PULLED,
+    RATE,
+    RECOVERS,
+    RELAX,
+    REPORT,
+    RESIDUAL,
+    SCRATCH,
+    SLOPE,
+    STARTS,
+    SURFACE,
+    TRIAL,
+    TRIAL_CELL,
+    UNILATERAL,
+    Array,
+    Doubles,
+    Ints,
+    Program,
+    W,
+    X,
+    Y,
+    chain,
+    product,
+    total,
 )
-REPORT, PLAY, FRAME, PROBE, DEPTH, LAW, ELASTIC, RATE, CONTACT, GAP, LOAD, SENSOR, SAMPLING = range(13)
-
-# program: sizes and offsets, where each place's blocks start, then (address, state, parameters) a block
-MODES, UNILATERAL, FILM, ONCE, BONDED, INNER, INNER_SIZE, TRIAL, SCRATCH, RELAX, CACHE, STARTS = range(12)
-ROWS = STARTS + len(PLACES) + 1
-
-# state: what the solver keeps …
-X, Y, CELL, SLOPE, RESIDUAL, TRIAL_CELL = range(6)
-OUTER = 6
-# … and the pad's own, at INNER and in its trial copies: w_1 … w_r follow, and the blocks' own; then the same once more,
-# where a part of the pad stays bonded
-FE, PAD_DEPTH, PAD_FORCE, SURFACE, STEEPNESS, PULLED, W = range(7)
+from sim.surface import free_surface, surface_force, torn
 
 _TOLERANCE = 4e-15
-_BESIDE = 1e-3  # of the way to the last surface, where no slope is known
-_RESIDUE = 1e-12  # of the force that relaxes: what a pad that has let go may carry
 
 
 @compiled("float64(float64)")
@@ -65,139 +74,6 @@ def ramp_gain(x: float) -> float:
     if x < 0.02:  # the series is exact to rounding here, and quicker than expm1
         return 1.0 - x / 2 * (1.0 - x / 3 * (1.0 - x / 4 * (1.0 - x / 5 * (1.0 - x / 6 * (1.0 - x / 7)))))
     return -math.expm1(-x) / x
-
-
-@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, int64, float64, float64)")
-def chain(program: Ints, params: Doubles, state: Doubles, shift: int, place: int, dt: float, u: float) -> float:
-    """The blocks of a place one after the other; state offsets moved by `shift` (a trial copy)."""
-    for k in range(program[STARTS + place], program[STARTS + place + 1]):
-        row = ROWS + 3 * k
-        u = call_block(program[row], dt, u, state, program[row + 1] + shift, params, program[row + 2])
-    return u
-
-
-@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, int64, float64, float64)")
-def total(program: Ints, params: Doubles, state: Doubles, shift: int, place: int, dt: float, u: float) -> float:
-    """Sum of the blocks of a place."""
-    result = 0.0
-    for k in range(program[STARTS + place], program[STARTS + place + 1]):
-        row = ROWS + 3 * k
-        result += call_block(program[row], dt, u, state, program[row + 1] + shift, params, program[row + 2])
-    return result
-
-
-@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, int64, float64, float64)")
-def product(program: Ints, params: Doubles, state: Doubles, shift: int, place: int, dt: float, u: float) -> float:
-    """Product of the blocks of a place."""
-    result = 1.0
-    for k in range(program[STARTS + place], program[STARTS + place + 1]):
-        row = ROWS + 3 * k
-        result *= call_block(program[row], dt, u, state, program[row + 1] + shift, params, program[row + 2])
-    return result
-
-
-@compiled(
-    "float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64, float64)"
-)
-def surface_force(
-    program: Ints,
-    params: Doubles,
-    state: Doubles,
-    shift: int,
-    dt: float,
-    since: float,
-    s: float,
-    A: float,
-    B: float,
-) -> float:
-    """Force of the pad were its surface at depth `s`: A + B F^e(s) + contact(s), all blocks on a scratch copy, which
-    stays. `since`: for how long the pad has been touched in this step of `dt`."""
-    inner, scratch = program[INNER], program[SCRATCH]
-    for k in range(program[INNER_SIZE]):
-        state[scratch + k] = state[inner + shift + k]
-    aside = scratch - inner
-    Fe = product(program, params, state, aside, ELASTIC, dt, s) * chain(program, params, state, aside, LAW, dt, s)
-    state[scratch + FE] = Fe
-    return A + B * Fe + total(program, params, state, aside, CONTACT, since, s)
-
-
-@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64, float64, float64)")
-def free_surface(
-    program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, depth: float, A: float, B: float
-) -> float:
-    """Depth at which a pad that has let go carries no force; `depth` itself where the force there is not below 0, or is
-    so at every depth. Where it is not `depth`, the scratch copy is then the state there.
-
-    Newton's steps from the last surface with the last slope, then secant steps, within a bracket: a surface recovers
-    little in a step, and the force there rises with the depth.
-    """
-    pad = program[INNER] + shift
-    tolerance = _RESIDUE * max(abs(A), 0.1)
-    low = max(depth, 0.0)  # nothing of the pad's changes above its surface
-    s = max(state[pad + SURFACE], low)
-    f = surface_force(program, params, state, shift, dt, dt, s, A, B)
-    # a surface that goes deeper: where a law falls with the depth, the probe may be on the pad
-    if f < -tolerance and s > depth and surface_force(program, params, state, shift, dt, dt, depth, A, B) >= 0.0:
-        return depth
-    a, f_a = s, f
-    width = max(s - low, 1e-6)
-    for _ in range(60):
-        if not f < -tolerance:
-            break
-        a, f_a, low = s, f, s
-        s += width
-        width *= 2.0
-        f = surface_force(program, params, state, shift, dt, dt, s, A, B)
-    if not f >= -tolerance:  # a law that falls with the depth has none: the surface stays with the probe
-        return depth
-    high = s
-    slope = (f - f_a) / (s - a) if s > a else state[pad + STEEPNESS]
-    stale = 0
-    sure = False  # that the force at `depth` is below 0
-    for _ in range(200):
-        if abs(f) <= tolerance:
-            break
-        c = s - f / slope if slope > 0.0 else high - _BESIDE * (high - low)
-        if not c < high or stale > 2:
-            c = 0.5 * (low + high)
-            stale = 0
-        if not low < c:
-            if not sure and surface_force(program, params, state, shift, dt, dt, depth, A, B) >= 0.0:
-                return depth
-            sure = True
-            c = 0.5 * (low + high)
-        if not low < c < high:  # nothing lies between
-            break
-        before = high - low
-        a, f_a = s, f
-        s = c
-        f = surface_force(program, params, state, shift, dt, dt, s, A, B)
-        if s != a:
-            slope = (f - f_a) / (s - a)
-        if f < 0.0:
-            low, sure = s, True
-        else:
-            high = s
-        stale = stale + 1 if high - low > 0.5 * before else 0
-    if slope > 0.0:
-        state[pad + STEEPNESS] = slope
-    return float(s)
-
-
-@compiled("float64(CPointer(int64), CPointer(float64), CPointer(float64), int64, float64, float64)")
-def torn(program: Ints, params: Doubles, state: Doubles, shift: int, dt: float, F: float) -> float:
-    """What a film between pad and probe bears of a tension F < 0 at the end of a step: F itself, or, once its impulse
-    is used up, the mean over the step of what it bore in it; 0 without a film, and after."""
-    if program[FILM] == 0:
-        return 0.0
-    pad = program[INNER] + shift
-    left = params[program[FILM]] - state[pad + PULLED]
-    if left <= 0.0:
-        return 0.0
-    before = state[pad + PAD_FORCE]  # the force goes linearly over the step
-    pulled = 0.5 * dt * F * F / (before - F) if before > 0.0 else 0.5 * dt * -(before + F)
-    state[pad + PULLED] += min(pulled, left)
-    return F if pulled < left else -left / dt
 
 
 @compiled("void(CPointer(int64), CPointer(float64), CPointer(float64), float64)")
@@ -306,6 +182,8 @@ def pad_step(program: Ints, params: Doubles, state: Doubles, shift: int, dt: flo
     if program[BONDED] != 0:
         twin = shift + program[INNER_SIZE] // 2
         F += params[program[BONDED]] * (bonded_step(program, params, state, twin, dt, y) - F)
+    went = off and before < state[pad + SURFACE] and dt > 0.0  # and not only left where the probe let go
+    state[pad + RECOVERS] = (state[pad + SURFACE] - surface) / dt if went else 0.0
     state[pad + FE] = Fe
     state[pad + PAD_DEPTH] = depth
     state[pad + PAD_FORCE] = F

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim import kernel as k
+from sim import slots as slot
 from sim.effects.base import Active
 from sim.elastic import ElasticLaw
 from sim.grid import Grid, check_times, checked, of_one_length, steps, union
@@ -158,7 +159,7 @@ class Cascade:
         decay, gain = grid.fades(() if layout.has("rate") else self.pad.relaxation.rates)
         k.run(layout.program, layout.parameters, state, grid.dt_s, position, force, probe, decay, gain)
         if layout.has("sensor") and not felt_by_cell:
-            k.run_chain(layout.program, layout.parameters, state, k.SENSOR, grid.dt_s, force)
+            k.run_chain(layout.program, layout.parameters, state, slot.SENSOR, grid.dt_s, force)
         return force, probe
 
     def _begin(self, state: Array, at_mm: float, past: Past) -> None:
@@ -169,16 +170,16 @@ class Cascade:
         program, r = self.layout.program, self.pad.relaxation.order
         spare, none = np.empty((2, way.size)), np.empty((0, way.size))
         k.run(program, self.layout.parameters, state, dt, way, spare[0], spare[1], none, none)
-        twins = (0, int(program[k.INNER_SIZE]) // 2) if program[k.BONDED] else (0,)
-        for pad in (int(program[k.INNER]) + twin for twin in twins):
-            state[pad + k.W : pad + k.W + r] = state[pad + k.FE] + past.at(self.pad.relaxation.rates)
+        twins = (0, int(program[slot.INNER_SIZE]) // 2) if program[slot.BONDED] else (0,)
+        for pad in (int(program[slot.INNER]) + twin for twin in twins):
+            state[pad + slot.W : pad + slot.W + r] = state[pad + slot.FE] + past.at(self.pad.relaxation.rates)
 
     def _sampled(self, dt: Array, force: Array) -> Array:
         """What sampling makes of a force at its samples, `dt` apart."""
         layout = self.layout
         if layout.has("sampling"):
             force = k.as_vector(force)
-            k.run_chain(layout.program, layout.parameters, layout.state.copy(), k.SAMPLING, dt, force)
+            k.run_chain(layout.program, layout.parameters, layout.state.copy(), slot.SAMPLING, dt, force)
         return force
 
 
@@ -192,7 +193,7 @@ class Plant:
         self.state = layout.state.copy()
         self._step = k.step.native
         self._chain = k.chain_step.native
-        self._pad = int(layout.program[k.INNER])
+        self._pad = int(layout.program[slot.INNER])
 
     def __reduce__(self) -> str:
         raise TypeError("a plant belongs to its process; send the model, and make a plant of it there")
@@ -203,45 +204,45 @@ class Plant:
 
     def sense(self, dt_s: float, force_N: float) -> float:
         """The force path (lag, resonance, bias …) over one step: force at the cell → force in the path, N."""
-        return self._chain(self.program, self.parameters, self.state, k.SENSOR, dt_s, force_N)
+        return self._chain(self.program, self.parameters, self.state, slot.SENSOR, dt_s, force_N)
 
     def sample(self, dt_s: float, force_N: float) -> float:
         """One sample of the force path: what is reported, dt_s after the last sample (limits, stuck values …)."""
-        return self._chain(self.program, self.parameters, self.state, k.SAMPLING, dt_s, force_N)
+        return self._chain(self.program, self.parameters, self.state, slot.SAMPLING, dt_s, force_N)
 
     def reported_mm(self, position_mm: float) -> float:
         """Position as the encoder reports it, for a true one."""
-        return self._chain(self.program, self.parameters, self.state, k.REPORT, 0.0, position_mm)
+        return self._chain(self.program, self.parameters, self.state, slot.REPORT, 0.0, position_mm)
 
     @property
     def probe_mm(self) -> float:
         """Where the probe is: motor side less play and deflection."""
-        return float(self.state[k.Y])
+        return float(self.state[slot.Y])
 
     @property
     def force_N(self) -> float:
         """Force at the cell after the last step."""
-        return float(self.state[k.CELL])
+        return float(self.state[slot.CELL])
 
     @property
     def pad_force_N(self) -> float:
         """Force between probe and pad after the last step."""
-        return float(self.state[self._pad + k.PAD_FORCE])
+        return float(self.state[self._pad + slot.PAD_FORCE])
 
     @property
     def depth_mm(self) -> float:
         """Depth that the pad's law sees (probe less offsets and set)."""
-        return float(self.state[self._pad + k.PAD_DEPTH])
+        return float(self.state[self._pad + slot.PAD_DEPTH])
 
     @property
     def elastic_force_N(self) -> float:
         """F^e after the last step; where the pad has let go, the one that gives no force."""
-        return float(self.state[self._pad + k.FE])
+        return float(self.state[self._pad + slot.FE])
 
     @property
     def residual_mm(self) -> float:
         """What was left of y + Σ frame(F) − x in the last step; 0 without a frame effect."""
-        return float(self.state[k.RESIDUAL])
+        return float(self.state[slot.RESIDUAL])
 
     def reset(self) -> None:
         """Back to rest, never touched."""

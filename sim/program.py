@@ -1,4 +1,4 @@
-"""Lays a pad and its effects out for the compiled loop: program, parameters, first state (see sim/kernel.py)."""
+"""Lays a pad and its effects out for the compiled loop: program, parameters, first state (see sim/slots.py)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sim import kernel as k
+from sim import slots as slot
 from sim.effects.base import Active
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Layout:
 
     def has(self, place: str) -> bool:
         """Whether any block stands at the place."""
-        start = k.STARTS + k.PLACES.index(place)
+        start = slot.STARTS + slot.PLACES.index(place)
         return bool(self.program[start] != self.program[start + 1])
 
 
@@ -46,7 +46,7 @@ def lay_out(pad: Pad, effects: Sequence[Active]) -> Layout:
     parameters.append(pad.bonded)
 
     r = pad.relaxation.order
-    inner = [0.0] * (k.W + r)
+    inner = [0.0] * (slot.W + r)
     outer: list[float] = []
     placed: list[tuple[Active, int, bool, int]] = []
     for active in effects:
@@ -58,40 +58,40 @@ def lay_out(pad: Pad, effects: Sequence[Active]) -> Layout:
 
     if bonded_at:
         inner += inner
-    cache_at = k.OUTER + len(outer)
+    cache_at = slot.OUTER + len(outer)
     inner_at = cache_at + 1 + 2 * r
     trial_at = inner_at + len(inner)
     scratch_at = trial_at + len(inner)
     state = np.zeros(scratch_at + len(inner) + 1)  # a block without state at the very end still points inside
-    state[k.SLOPE] = 1.0
-    state[k.OUTER : cache_at] = outer
+    state[slot.SLOPE] = 1.0
+    state[slot.OUTER : cache_at] = outer
     state[cache_at] = np.nan
     state[inner_at:trial_at] = inner
 
     rows: list[tuple[int, int, int]] = []
     starts = [0]
-    for place in k.PLACES:
+    for place in slot.PLACES:
         if place == "law":
             rows.append((pad.law.block.address, inner_at, law_at))
         for active, offset, solved, parameters_at in placed:
             if place in active.form.blocks:
-                base = inner_at if solved else k.OUTER
+                base = inner_at if solved else slot.OUTER
                 rows.append((active.form.blocks[place].address, base + offset, parameters_at))
         starts.append(len(rows))
 
-    program = np.zeros(k.ROWS + 3 * len(rows), dtype=np.int64)
-    program[k.MODES] = r
-    program[k.UNILATERAL] = pad.unilateral
-    program[k.FILM] = film_at
-    program[k.ONCE] = pad.film_once
-    program[k.BONDED] = bonded_at
-    program[k.INNER] = inner_at
-    program[k.INNER_SIZE] = len(inner)
-    program[k.TRIAL] = trial_at
-    program[k.SCRATCH] = scratch_at
-    program[k.RELAX] = 0
-    program[k.CACHE] = cache_at
-    program[k.STARTS : k.ROWS] = starts
-    program[k.ROWS :] = np.array(rows, dtype=np.int64).ravel()
+    program = np.zeros(slot.ROWS + 3 * len(rows), dtype=np.int64)
+    program[slot.MODES] = r
+    program[slot.UNILATERAL] = pad.unilateral
+    program[slot.FILM] = film_at
+    program[slot.ONCE] = pad.film_once
+    program[slot.BONDED] = bonded_at
+    program[slot.INNER] = inner_at
+    program[slot.INNER_SIZE] = len(inner)
+    program[slot.TRIAL] = trial_at
+    program[slot.SCRATCH] = scratch_at
+    program[slot.RELAX] = 0
+    program[slot.CACHE] = cache_at
+    program[slot.STARTS : slot.ROWS] = starts
+    program[slot.ROWS :] = np.array(rows, dtype=np.int64).ravel()
     vector = np.array([*parameters, 0.0])
     return Layout(program, vector, state)

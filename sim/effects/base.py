@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.jit import Block
-from sim.kernel import PLACES
+from sim.slots import PLACES
 
 from .reading import read
 

@@ -14,9 +14,9 @@ from numpy.testing import assert_allclose
 from sim.effects import Active, Parameter, all_effects, effect
 from sim.elastic import Exponential
 from sim.grid import union
-from sim.kernel import PLACES
 from sim.model import Model
 from sim.pad import Cascade, Pad
+from sim.slots import PLACES
 from tests.sim.effect_tools import EVERY_FORM, GEL, active
 from tests.sim.test_pad import walk
 
