@@ -147,7 +147,7 @@ def _needless(
         small = gain <= (LEAST if last == 0 else FURTHER) * scale
         most_left = k < 2 and gain >= MOST_LEFT * (left - slow[k]) and gain >= SPEAKS * prepared.floor_N**2
         most_left = most_left and (k == 0 or gain >= EXACT * scale)
-        if small and not most_left:
+        if small and not most_left and not (last and _told_by_the_end(prepared, path, fits, k)):
             return k
     plain = later_square(prepared, fits[0])
     not_told = plain > UNTOLD * squares[0]  # what comes early does not tell the pad itself
@@ -174,6 +174,18 @@ def _needless(
             rest[k] = np.inf
     best = int(np.argmin(rest))
     return best if later > HARM * rest[best] else None
+
+
+def _told_by_the_end(prepared: Prepared, path: Path, fits: list[Fit], number: int) -> bool:
+    """Whether a cause under a sure name takes most of what all others leave of what comes last: of what was held out
+    amid the run it may take little, where that is where another cause comes in, whose size nothing else tells."""
+    if _sure(path, fits, number) < NAMED:
+        return False
+    others = without(prepared, fits[-1], len(fits[0].structure.causes) + number)
+    noise = prepared.floor_N**2
+    left, after = later_square(prepared, others), later_square(prepared, fits[-1])
+    taken = left - max(after, noise)
+    return taken >= MOST_LEFT * (left - noise) and taken >= SPEAKS * noise
 
 
 def _doubtful(

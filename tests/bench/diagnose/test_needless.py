@@ -70,6 +70,12 @@ def test_one_that_takes_a_crumb_goes_and_one_that_takes_most_of_what_is_left_sta
     assert needless(monkeypatch, [40000.0, 3.0, 1.1], []) == 1  # no shape of the first is so exact
 
 
+@pytest.mark.parametrize(("end", "sure", "gone"), [(1.1, 0.7, None), (3.5, 0.7, 1), (1.1, 0.5, 1)])
+def test_one_that_takes_a_crumb_stays_where_it_takes_most_of_what_the_end_leaves(monkeypatch, end, sure, gone):
+    """A frame beside a pad that softens where it is pressed deeper: there nothing else tells how much."""
+    assert needless(monkeypatch, [400.0, 3.0, 2.5], [], later=[9.0, 5.0, end], sure=sure) == gone
+
+
 def test_one_that_does_harm_later_goes_but_a_drift_may_turn(monkeypatch):
     assert needless(monkeypatch, [400.0, 3.0], [], later=[2.0, 2000.0]) == 0
     assert needless(monkeypatch, [400.0, 3.0], [], ["force_drift"], later=[2.0, 2000.0]) is None
