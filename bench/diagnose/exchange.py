@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .evidence import RIVAL, believable, unexplained
-from .path import Measure, Path
+from .path import Measure, Path, Trial
 from .refit import Fit, last, refit
 from .shaping import RIVALS, Shaping, no_rival
 from .sieve import ALL, BETTER, COMPARED, drawn, plainer_first
@@ -11,6 +11,7 @@ from .sieve import ALL, BETTER, COMPARED, drawn, plainer_first
 NEARLY = 0.95  # of what a cause takes: what another takes in its place that its best shape may do better
 MISSED, SHAPED = 0.75, 2  # of what a further cause takes, that it took in the shape in which it came in; and how many
 # rivals are asked for their shapes then
+NOTHING = 1.05  # times what noise leaves
 MOST_NEAR = 8  # that stood close behind a cause with no more numbers, and are tried in its place
 
 
@@ -21,40 +22,46 @@ class Exchange(Shaping):
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
         out. Where nothing is left, those alone that stood near: what made them worse may have been the other cause."""
         best, told = path.fits[-1], False
-        score = self._to_beat(best)
         own = len(self.believed.causes)
         for index in range(own, len(best.structure.causes)):
-            stage = min(index - own, len(path.tried) - 1)
-            stood = path.rivals[stage]
-            near = self._near(path.measures[stage].before, stood, MOST_NEAR)
-            if self._times_left(path) <= 1.05:
-                rivals = [t.id for t in near[:RIVALS]]
-            else:
-                plain = [t.id for t in near if t.fit.free <= stood[0].fit.free]
-                rivals = [*path.tried[stage][:5], *plain, *path.tried[-1][:4]]
             present = {c.id for c in best.structure.causes}
-            rivals = [r for r in dict.fromkeys(rivals) if r not in present]
+            rivals = [i for i in self._stood_beside(path, index - own) if i not in present]
             if not rivals:
                 continue
             without = self._without(best, index)
             if without.chi2 < best.chi2:  # it was in the way
                 return refit(self.short, without.structure, without.x, ALL, 1e-8)
             room = RIVAL * self.prepared.memory if self._a_limit(best, index) else 0.0
-            for trial in self.ranked(without, only=rivals)[:1]:
-                gained = without.chi2 - trial.fit.chi2
-                shaped, worse = trial, trial.score >= score + room
-                if worse and gained > NEARLY * (without.chi2 - best.chi2):
-                    shaped = self._told(trial)
-                asked = shaped is not trial or (not worse and unexplained(best.chi2, self.expected) > 0.0)
-                if asked and not told:  # shapes against shapes
-                    best, told = self.recurved(best), True
-                    score = self._to_beat(best)
-                    if shaped is trial and trial.score >= score + room:
-                        shaped = self._told(trial)
-                trial = shaped
-                if trial.score < score + room and believable(trial.fit, self.prepared):
-                    best, score = trial.fit, self._to_beat(trial.fit)
+            for other in self.ranked(without, only=rivals)[:1]:
+                best, told = self._better(best, other, without.chi2, room, told)
         return best
+
+    def _stood_beside(self, path: Path, stage: int) -> list[str]:
+        """Ids that are tried in the place of the cause that came in at a stage."""
+        stage = min(stage, len(path.tried) - 1)
+        stood = path.rivals[stage]
+        near = self._near(path.measures[stage].before, stood, MOST_NEAR)
+        if self._times_left(path) <= NOTHING:
+            return [t.id for t in near[:RIVALS]]
+        plain = [t.id for t in near if t.fit.free <= stood[0].fit.free]
+        return list(dict.fromkeys([*path.tried[stage][:5], *plain, *path.tried[-1][:4]]))
+
+    def _better(self, fit: Fit, other: Trial, before: float, room: float, told: bool) -> tuple[Fit, bool]:
+        """(A fit, or one with another cause in the place of one of its own where that is better; whether the fit's own
+        causes have been asked for their best shapes, as before where `told`). `before`: χ² with neither; `room`: by
+        which the other may be worse."""
+        score = self._to_beat(fit) + room
+        shaped, worse = other, other.score >= score
+        if worse and before - other.fit.chi2 > NEARLY * (before - fit.chi2):
+            shaped = self._told(other)
+        asked = shaped is not other or (not worse and unexplained(fit.chi2, self.expected) > 0.0)
+        if asked and not told:  # shapes against shapes
+            fit, told = self.recurved(fit), True
+            score = self._to_beat(fit) + room
+            if shaped is other and other.score >= score:
+                shaped = self._told(other)
+        better = shaped.score < score and believable(shaped.fit, self.prepared)
+        return (shaped.fit if better else fit), told
 
     def _a_limit(self, fit: Fit, index: int) -> bool:
         """Whether a cause is at a bound: then it is another's limit, as what came in beside it has shown."""
