@@ -130,7 +130,8 @@ WHAT_IS_COUNTED = """
 - *Spurious*: a cause after the first that was not hidden. *Both of a pair*: named at any place, of the pairs of which
   each effect alone would be detectable. *Or listed …*: one that is not named stands among the alternatives of a name
   that was not hidden, which in its place fits as well. *Each seen beside the other*: of those, pairs of which neither
-  effect can be made by the pad's numbers and the other's size but for χ² of 600 (table of pairs below).
+  effect can be made by the pad's numbers and the other's size, or by any law where the other is one, but for χ² of 600
+  (table of pairs below).
 - *That the one or two named do not imitate*: without the cases in which one or two causes were named that leave at most
   a quarter of the misfit's power where there is no noise: with so little left a cause is called explained, and the
   effect outside the catalogue is one that a single or a pair imitates.
@@ -149,8 +150,8 @@ WHAT_IS_COUNTED = """
 
 WHAT_IS_SEEN_BESIDE = """
 Pairs of which each effect alone would be detectable, by the χ² that the lesser one makes beside the other: what of it
-neither the pad's numbers nor the size of the other can make, the other's shape being known (tests/truth/beside.py).
-The diagnosis does not know the shape.
+neither the pad's numbers nor the size of the other can make, the other's shape being known, but of another law nothing
+(tests/truth/beside.py). The diagnosis knows no shape.
 """
 
 

@@ -9,7 +9,9 @@ counted in units of the noise as in `detect`:
 
 with r the force less that of the plain pad on the reported motion, J its derivatives by the pad's numbers and by the
 size of A, W whitening. The shape of A is held, of which nobody told the lab: a shape that bends as well makes B harder
-to see. So what is called hidden here is hidden, and not the other way about.
+to see. So what is called hidden here is hidden, and not the other way about. Of another law that is too little: what an
+encoder's error makes on a pad that stays put is a law too. Where A is one, J has its values at some depths as well, so
+that it may be any smooth curve.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from .cases import Case, draw_case
-from .detect import Lab, _faults, _sigma, _whitened, freed, of_the_pad
+from .detect import Lab, _faults, _sigma, _whitened, freed, of_any_law, of_the_pad
 
 Array = np.ndarray
 
@@ -64,7 +66,8 @@ def seen_beside(case: Case) -> dict[str, float]:
     for id in truth.ids:
         (other,) = (known for known in truth.ids if known != id)
         own = weighed(_beyond(both) - _beyond(drawn_again(case, other)))
-        left = freed(own, [*of_pad, weighed(slope(case, other, *truth.ids))])
+        of_law = of_any_law(both.truth, lab, weighed) if other == "elastic_law" else []
+        left = freed(own, [*of_pad, weighed(slope(case, other, *truth.ids)), *of_law])
         out[id] = float(left @ left)
         if id in FAULTS:
             out[id] += _faults(both.truth, sigma)

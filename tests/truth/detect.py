@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 from .cases import Case, Truth
@@ -24,6 +25,8 @@ from .noise import Coloured, Quantised, White
 from .pad import Pad
 
 ENOUGH = 60.0
+LAW_POINTS = 15
+"""Of a law of which nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -167,6 +170,22 @@ def of_the_pad(truth: Truth, lab: Lab, weighed: Callable[[np.ndarray], np.ndarra
     steps = [1e-4 * max(abs(x[k]), 0.1) * (np.arange(len(x)) == k) for k in range(len(x))]
     pads = [(_pad(truth.structure, x + h), _pad(truth.structure, x - h)) for h in steps]
     return [weighed(lab.force(above) - lab.force(below)) for above, below in pads]
+
+
+def of_any_law(truth: Truth, lab: Lab, weighed: Callable[[np.ndarray], np.ndarray]) -> list[np.ndarray]:
+    """How the plain pad's weighed force goes with its law at each of some depths, a cubic curve between; up to a
+    factor."""
+    pad, depth = truth.structure, np.maximum(lab.depth_mm, 0.0)
+    shares, rates, lets_go = np.array(pad.shares), np.array(pad.rates), pad.contact == "unilateral"
+    u = pad.law.force(lab.depth_mm)
+    h = 1e-4 * float(np.abs(u).max())
+    points = np.linspace(0.0, float(depth.max()), LAW_POINTS + 1)
+    out = []
+    for own in np.eye(LAW_POINTS + 1)[1:]:
+        curve = h * CubicSpline(points, own, bc_type="natural")(depth)
+        above, below = (_run(u + way * curve, lab.h, shares, rates, lets_go) for way in (1.0, -1.0))
+        out.append(weighed((above - below)[lab.at]))
+    return out
 
 
 def freed(own: np.ndarray, columns: list[np.ndarray]) -> np.ndarray:

@@ -34,6 +34,18 @@ def test_two_that_only_make_the_force_late_hide_each_other():
         assert alone[id] > ENOUGH and seen[id] < 0.05 * alone[id]
 
 
+def test_a_wave_of_the_position_is_another_law_on_a_pad_that_stays_put_and_hum_is_none():
+    def share(id, shape, seed):
+        """Of what it makes alone, that is seen beside a law of which nothing is known."""
+        shapes = {"elastic_law": "kondner", id: shape}
+        case = draw_case(seed, tuple(shapes), dict.fromkeys(shapes, 1.0), shapes, **PLAIN, rate_hz=500.0)
+        return seen_beside(case)[id] / misfit(case.alone(id)).chi2
+
+    waves = [share("encoder_error", "reported", seed) for seed in range(8)]
+    assert np.median(waves) < 0.05 and max(waves) < 0.25
+    assert all(share("mains_hum", "sine", seed) == pytest.approx(1.0, rel=0.15) for seed in range(3))
+
+
 def test_it_goes_with_the_square_of_a_size_that_is_small():
     shapes = {"force_drift": "linear", "mains_hum": "sine"}
     half, whole = (
