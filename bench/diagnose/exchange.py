@@ -87,7 +87,7 @@ class Exchange(Shaping):
         if not drawn(law) or any(c.id == "encoder_error" for c in causes):
             return
         without = self._without(final, index)
-        beside = [self._shaped(t) for t in self.ranked(without, only=["encoder_error"])]
+        law, *beside = (self._shaped(t) for t in [law, *self.ranked(without, only=["encoder_error"])])
         wave = plainer_first(without, [law, *beside])[0]
         if wave is law or not believable(wave.fit, self.prepared):
             return
