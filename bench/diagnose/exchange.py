@@ -75,6 +75,10 @@ class Exchange(Shaping):
         """What was found leaves, in what noise leaves."""
         return path.fits[-1].chi2 / self.expected
 
+    def _measure(self, before: Fit) -> Measure:
+        """By which the χ² of a stage after a fit are judged, as the data are now."""
+        return Measure(before.chi2, self.expected, self.effective, self.prepared.memory)
+
     def _wave_for_a_law(self, path: Path) -> None:
         """At a path's end an error of the position that repeats, in the place of a law through points, where that is
         all that the law does beside the other causes: which of the two is told once those are there."""
@@ -92,8 +96,7 @@ class Exchange(Shaping):
         if wave is law or not believable(wave.fit, self.prepared):
             return
         path.fits[-1] = wave.fit
-        measure = Measure(without.chi2, self.expected, self.effective, self.prepared.memory)
-        path.compared[wave.id] = (wave, [law], measure)
+        path.compared[wave.id] = (wave, [law], self._measure(without))
 
     def _compare(self, path: Path) -> None:
         """Causes that came in amid others which have gone since, or behind one, or in another shape that missed much of
@@ -124,5 +127,4 @@ class Exchange(Shaping):
                 rivals = sorted(
                     (self._shaped(t) if k < SHAPED else t for k, t in enumerate(rivals)), key=lambda t: t.score
                 )
-            measure = Measure(without.chi2, self.expected, self.effective, self.prepared.memory)
-            path.compared[now.id] = (now, rivals, measure)
+            path.compared[now.id] = (now, rivals, self._measure(without))

@@ -27,7 +27,7 @@ from .exchange import Exchange
 from .felt_errors import felt_errors, redrawn
 from .late_by_chance import late_by_chance_s
 from .numbers import shapes_of
-from .path import Measure, Path, Trial
+from .path import Path, Trial
 from .refit import Fit, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import families
@@ -280,7 +280,7 @@ class Search(Exchange):
         stood = [*turn.ranked, *turn.small]
         path.rivals.append(self._with_a_long_wave(path.fits[-1], stood) if turn.found.significant else stood)
         path.tried.append(turn.tried)
-        path.measures.append(Measure(path.fits[-1].chi2, self.expected, self.effective, self.prepared.memory))
+        path.measures.append(self._measure(path.fits[-1]))
         path.evidence.append(turn.found)
 
     def _with_a_long_wave(self, now: Fit, ranked: list[Trial]) -> list[Trial]:
