@@ -111,6 +111,35 @@ def test_where_the_last_cause_has_another_shape_those_before_it_are_held_against
     assert search.exchanges == 2, "as it came in, and in its shape"
 
 
+@pytest.mark.parametrize(
+    ("id_", "form", "other", "taken"),
+    [
+        ("stress_softening", "ogden_roxburgh", 5600.0, True),
+        ("stress_softening", "ogden_roxburgh", 8300.0, False),  # permanent set leaves less
+        ("cogging", "sine", 5600.0, False),
+        ("cogging", "sine", 3000.0, True),
+    ],
+)
+def test_a_shape_at_its_bound_is_stood_for_by_another_that_a_wave_must_far_surpass(
+    monkeypatch, id_, form, other, taken
+):
+    """The shape that leads leaves 5,500, of which noise is 1,000; its reach is at the end of what the data tell."""
+    shape, rival = effect(id_).form(form), fit(8200.0, "permanent_set")
+    lead, within = fit(5500.0, id_), fit(other, id_)
+
+    def trial(fit: Any) -> Any:
+        return SimpleNamespace(id=id_, cause=SimpleNamespace(form=shape), fit=fit, score=fit.chi2)
+
+    search = Told({}, None)
+    monkeypatch.setattr(module, "believable", lambda fit, prepared: fit is not lead)
+    monkeypatch.setattr(module, "families", lambda *told: [[None, SimpleNamespace(fit=within)]])
+    monkeypatch.setattr(search, "_trial", trial)
+    monkeypatch.setattr(search, "_a_longer_wave", lambda ranked: None)
+    set_ = SimpleNamespace(id="permanent_set", fit=rival, score=8200.0)
+    best = search._inside(Path([fit(29e3)]), [trial(lead), set_])[0]
+    assert (best.fit is within) == taken
+
+
 class Counting(Told):
     """A search that counts its turns."""
 
