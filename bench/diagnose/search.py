@@ -25,6 +25,7 @@ from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
 from .exchange import Exchange
 from .felt_errors import felt_errors, redrawn
+from .late import LATE
 from .late_by_chance import late_by_chance_s
 from .numbers import shapes_of
 from .path import Path, Trial
@@ -41,7 +42,7 @@ QUIET = 2.0  # times the noise's square: what is left altogether, where its colo
 MOST_WORK = 150_000_000  # simulated samples, after which no further cause is looked for
 MORE_FOR_TWO = 2.0  # times those, where the first of two leaves much
 A_SHAPE = 0.1  # of what is left beyond the noise, that another shape of a cause takes where no further cause pays
-HALF = 0.5  # of what a wave at a bound leaves beyond the noise: more is left by one that only evades the bound
+HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
 MUCH_LEFT, A_PART = 0.03, 0.05  # of what the belief leaves beyond the noise, that a first cause and all that follow it
 # leave; and what the lesser of two in its place takes, or of what was held out all that begins with another
 GOOD_PART, OTHERS = 0.4, 2  # of what a first cause takes, that others take; so many are tried where it was none
@@ -318,18 +319,19 @@ class Search(Exchange):
 
     def _inside(self, path: Path, ranked: list[Trial]) -> list[Trial]:
         """With another shape of the leading family in front, where that one pays, and has a number at the bound of what
-        can be told. Of a wave it must leave far less than that one does: a wave that grows as long as it may can be
-        two, and any shape of one is as wrong as the next."""
+        can be told. Of a wave, and of what makes the force late, it must leave far less than that one does: a wave that
+        grows as long as it may can be two, a mode as damped as it may be is a lag, and so is any shape of it."""
         if not ranked or believable(ranked[0].fit, self.prepared):
             return ranked
-        best = ranked[0].fit
+        lead, best = ranked[0], ranked[0].fit
         if not self.judge(path.fits[-1], best, path.fits[0]).pays:
             return ranked
         shapes = families(self.short, best, [len(best.structure.causes) - 1])[0][1:]
         tried = [t for t in (self._trial(m.fit) for m in shapes) if believable(t.fit, self.prepared)]
         again = self._carried(min(tried, key=lambda t: t.score), ALL) if tried else None
         least = HALF * (best.chi2 - self.expected)
-        if again is None or (ripples(ranked[0].cause.form) and again.fit.chi2 - self.expected > least):
+        anothers = ripples(lead.cause.form) or lead.id in LATE
+        if again is None or (anothers and again.fit.chi2 - self.expected > least):
             again = self._a_longer_wave(ranked)
         return ranked if again is None else sorted([again, *ranked[1:]], key=lambda t: t.score)
 

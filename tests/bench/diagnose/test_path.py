@@ -116,11 +116,12 @@ def test_where_the_last_cause_has_another_shape_those_before_it_are_held_against
     [
         ("stress_softening", "ogden_roxburgh", 5600.0, True),
         ("stress_softening", "ogden_roxburgh", 8300.0, False),  # permanent set leaves less
+        ("resonance", "low_pass", 5600.0, False),
         ("cogging", "sine", 5600.0, False),
         ("cogging", "sine", 3000.0, True),
     ],
 )
-def test_a_shape_at_its_bound_is_stood_for_by_another_that_a_wave_must_far_surpass(
+def test_a_shape_at_its_bound_is_stood_for_by_another_but_for_that_of_a_wave_or_a_lag(
     monkeypatch, id_, form, other, taken
 ):
     """The shape that leads leaves 5,500, of which noise is 1,000; its reach is at the end of what the data tell."""
