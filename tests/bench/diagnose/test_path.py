@@ -15,6 +15,7 @@ from bench.diagnose.noise import Colour
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.path import Measure, Path
 from bench.diagnose.result import Number
+from bench.diagnose.shaping import Shaping
 from sim.effects import effect
 from tests.bench.diagnose.told import NOISE, Told, fit, named
 
@@ -139,6 +140,25 @@ def test_a_shape_at_its_bound_is_stood_for_by_another_but_for_that_of_a_wave_or_
     set_ = SimpleNamespace(id="permanent_set", fit=rival, score=8200.0)
     best = search._inside(Path([fit(29e3)]), [trial(lead), set_])[0]
     assert (best.fit is within) == taken
+
+
+def test_what_was_asked_for_its_other_forms_is_not_asked_again_of_the_same_data(monkeypatch):
+    search, asked = Told({}, None), []
+    monkeypatch.setattr(search, "_in_another_form", lambda now: asked.append(now) or fit(1.0))
+
+    def at(*x: float, ids: tuple[str, ...] = ("friction",)) -> Any:
+        return SimpleNamespace(x=np.array(x), structure=fit(9e3, *ids).structure)
+
+    def other(now: Any) -> Any:
+        return Shaping.recurved(search, now)
+
+    assert other(at(1.0, 2.0)) is other(at(1.0, 2.0)) and len(asked) == 1
+    other(at(1.0, 2.5))
+    other(at(1.0, 2.0, ids=("friction/swelling",)))
+    assert len(asked) == 3
+    search.prepared = SimpleNamespace(**vars(search.prepared))
+    other(at(1.0, 2.0))
+    assert len(asked) == 4, "those data are others: their noise is white since"
 
 
 class Counting(Told):
