@@ -19,6 +19,7 @@ from sim.effects import effect
 from sim.model import Model
 from sim.relaxation import Relaxation
 from tests.bench.diagnose.small import fitted, measurement
+from tests.campaign.plan import Item
 from tests.truth.cases import draw_case
 
 
@@ -326,3 +327,18 @@ def test_a_drift_that_settles_is_known_without_half_waves_of_its_rate():
     # a third of the numbers, and what it leaves is noise
     assert steady.chi2 < 1.1 * (np.count_nonzero(prepared.short.weight > 0) - steady.free)
     assert steadier(prepared.short, steady) is steady
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_softening_whose_best_shape_is_at_its_bound_is_softening():
+    """A case in which a campaign named a permanent set beside another law, and left a fourteenth: the pad softens the
+    more, the deeper it is pressed, so that the best shape has the reach of the whole run; a cable chain moves too."""
+    shapes, sizes = ("cable_chain", "chain_limit"), (1.045, 1.28)
+    c = Item("pair", ("inertia", "stress_softening"), shapes, sizes, 1376985164).case()
+    said = diagnose(measurement(c), Model.from_dict(c.believed))
+    assert said.verdict == "explained"
+    assert {cause.id for cause in said.causes} == {"stress_softening", "inertia"}
+    mass = next(cause for cause in said.causes if cause.id == "inertia").parameters["mass"].value
+    assert mass == pytest.approx(c.truth.parameters["inertia"]["mass"], rel=0.1)
+    assert said.held_out_after < 1.05 * said.noise_floor
