@@ -8,19 +8,16 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .candidates import CHANNEL, Signatures, alike, forms, narrowed, starts, with_periods
 from .data import Prepared
 from .evidence import RIVAL, believable, unexplained
 from .numbers import Cause, cause_of, shapes_of
 from .path import Trial
-from .refit import Fit, jacobian, last, reduced, refit
+from .refit import Fit, last, reduced, refit
 from .ripple import ripples
 from .shapes import begun_anew, departed, waving
 from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_first
-
-Array = NDArray[np.float64]
 
 MUCH, MOST = 0.25, 0.5  # of its gain, and of what is left, that a further cause takes beside a second one of a kind
 AS_WELL = 0.8  # share of a second cause of a kind's gain, that a further cause's beside the first reaches
@@ -48,29 +45,22 @@ class Shaping(Sieve):
         return other
 
     def _in_another_form(self, now: Fit) -> Fit:
-        begun: list[tuple[Fit, Cause, Array]] = []
-        # near enough for a few steps, as the numbers of what stays change little
-        known = jacobian(self.short, now.structure, now.x)[:, : len(now.x) - now.structure.tail]
+        begun: list[tuple[Fit, Cause]] = []
         for index, cause in enumerate(now.structure.causes):
             if index < len(self.believed.causes) or cause.id in CHANNEL:
                 continue
             structure, x = reduced(now, index)
             here, without = replace(now, structure=structure, x=x), self._without(now, index)
-            beside = np.delete(known, now.structure.of_cause(index), axis=1)
             signatures, numbers = Signatures(self.short, without), now.structure.values(now.x)[index]
             for effect, form in forms(structure, structure.in_air, self.reach, also_unsought=True):
                 if effect.id != cause.id or form.name == cause.form.name:
                     continue
                 like = alike(now, index, cause_of(effect, form))
-                begun += [(here, c, beside) for c in (like, *begun_anew(self.short, now, index, like))]
-                begun += [
-                    (without, s.cause, signatures.jacobian) for s in starts(signatures, effect, form, near=numbers)
-                ]
+                begun += [(here, c) for c in (like, *begun_anew(self.short, now, index, like))]
+                begun += [(without, s.cause) for s in starts(signatures, effect, form, near=numbers)]
         with ThreadPoolExecutor(WORKERS) as pool:
             first = [
-                t
-                for t in pool.map(lambda start: self._joined(start[0], start[1], FEW, start[2]), begun)
-                if t is not None
+                t for t in pool.map(lambda start: self._joined(start[0], start[1], FEW, None), begun) if t is not None
             ]
             # each form on from its best start: one with a long way to go is behind after a few steps
             best = {(t.id, t.cause.form.name): t for t in sorted(first, key=lambda t: -t.score)}
