@@ -12,7 +12,7 @@ import numpy as np
 from .candidates import CHANNEL, Signatures, alike, forms, narrowed, starts, with_periods
 from .data import Prepared
 from .evidence import RIVAL, believable, unexplained
-from .numbers import Cause, cause_of, shapes_of
+from .numbers import Cause, cause_of
 from .path import Trial
 from .refit import Fit, last, reduced, refit
 from .ripple import ripples
@@ -37,8 +37,7 @@ class Shaping(Sieve):
     def recurved(self, now: Fit) -> Fit:
         """The fit with one of its causes in another form, also of those that only refine others; if that is better."""
         for prepared, fit, other in self._asked:
-            same = prepared is self.prepared and shapes_of(fit.structure) == shapes_of(now.structure)
-            if same and np.array_equal(fit.x, now.x):
+            if prepared is self.prepared and fit is now:
                 return other
         other = self._in_another_form(now)
         self._asked.append((self.prepared, now, other))

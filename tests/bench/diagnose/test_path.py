@@ -146,18 +146,16 @@ def test_what_was_asked_for_its_other_forms_is_not_asked_again_of_the_same_data(
     search, asked = Told({}, None), []
     monkeypatch.setattr(search, "_in_another_form", lambda now: asked.append(now) or fit(1.0))
 
-    def at(*x: float, ids: tuple[str, ...] = ("friction",)) -> Any:
-        return SimpleNamespace(x=np.array(x), structure=fit(9e3, *ids).structure)
-
     def other(now: Any) -> Any:
         return Shaping.recurved(search, now)
 
-    assert other(at(1.0, 2.0)) is other(at(1.0, 2.0)) and len(asked) == 1
-    other(at(1.0, 2.5))
-    other(at(1.0, 2.0, ids=("friction/swelling",)))
+    now = fit(9e3, "friction")
+    assert other(now) is other(now) and len(asked) == 1
+    other(fit(9e3, "friction"))
+    other(fit(9e3, "friction/swelling"))
     assert len(asked) == 3
     search.prepared = SimpleNamespace(**vars(search.prepared))
-    other(at(1.0, 2.0))
+    other(now)
     assert len(asked) == 4, "those data are others: their noise is white since"
 
 
