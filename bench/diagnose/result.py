@@ -67,6 +67,8 @@ class CauseFound:
     of_its_kind: float = 0.0
     """Confidence that it is this one or another of its kind, where that is more: a force that comes late is late by a
     delay, a lag or a stiff resonance."""
+    doubt: str = ""
+    """What keeps the name from being as sure as its rivals would leave it; empty: nothing."""
 
     def to_json(self) -> dict[str, Any]:
         """The entry of diagnosis.json."""
@@ -79,6 +81,7 @@ class CauseFound:
             "alternatives": [a.to_json() for a in self.alternatives],
             "explanation": self.explanation,
             "check": self.check,
+            "doubt": self.doubt,
         }
 
 

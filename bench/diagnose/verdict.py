@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -33,6 +34,9 @@ SLIGHT, SLIGHTLY = 0.02, 0.65  # of the error: how sure a cause that takes less 
 # of three were right, and what the others took was missing from the first one's shape
 ANOTHERS = 0.5  # how sure the name of a cause can be that is as far from its family's first shape as it can go
 BEGUN = 0.02  # of a cause's size, with which it begins anew
+ONCE = "too little comes twice in this run"
+BESIDE = "it takes next to nothing beside the others, and what their shapes miss can look like it"
+FAR_OFF = "its shape is so far from the usual one that it may stand for another cause"
 MANY = 3  # causes, as many as a search finds: so many together imitate what none of them is
 
 
@@ -239,16 +243,34 @@ def found(search: Search, path: Path, final: Fit, gains: Sequence[float]) -> lis
         id_, form, numbers = described(final, own + k)
         cause = final.structure.causes[own + k]
         values = {name: number.value for name, number in numbers.items()}
-        most = min(told_size(final, own + k), most_sure(cause.effect, cause.form.name, search.reach.rich))
-        most = min(most, SLIGHTLY) if len(gains) > 1 and gain < SLIGHT else most
-        most = min(most, ANOTHERS) if departed(search.short, final, own + k) else most
-        confidence, kind = min(confidence, most), min(kind, most)
-        out.append(
-            CauseFound(
-                id_, form, numbers, gain, confidence, others, explain(cause.effect, values), cause.effect.check, kind
-            )
-        )
+        most, doubt = _at_the_most(search, final, own + k, gain, len(gains))
+        doubt = doubt if most < confidence else ""
+        sure, kind, told = min(confidence, most), min(kind, most), explain(cause.effect, values)
+        out.append(CauseFound(id_, form, numbers, gain, sure, others, told, cause.effect.check, kind, doubt))
     return out
+
+
+def _at_the_most(search: Search, final: Fit, index: int, gain: float, named: int) -> tuple[float, str]:
+    """(how sure the name of a fit's cause, of so many `named`, can be whatever its rivals reach; and what keeps it from
+    more)."""
+    cause = final.structure.causes[index]
+    limits = [
+        (told_size(final, index), _of_the_size(final, index)),
+        (most_sure(cause.effect, cause.form.name, search.reach.rich), ONCE),
+        (SLIGHTLY if named > 1 and gain < SLIGHT else 1.0, BESIDE),
+        (ANOTHERS if departed(search.short, final, index) else 1.0, FAR_OFF),
+    ]
+    return min(limits, key=lambda limit: limit[0])
+
+
+def _of_the_size(final: Fit, index: int) -> str:
+    """What is wrong with the size of a fit's cause where its name cannot be sure."""
+    cause, numbers = final.structure.causes[index], described(final, index)[2]
+    if cause.amplitude is None:
+        return ""
+    name = cause.amplitude.name
+    told = math.isfinite(numbers[name].std)
+    return f"these data hardly tell its {name}" if told else f"its {name} is as far as it is sought here"
 
 
 def told_size(final: Fit, index: int) -> float:

@@ -193,6 +193,11 @@ def rivals(cause: CauseFound) -> str:
     return ""
 
 
+def no_surer(cause: CauseFound) -> str:
+    """Why a name is no surer than it is, where that is not for its rivals; else empty."""
+    return f"no surer, for {cause.doubt}" if cause.doubt else ""
+
+
 def gain(rival: Alternative) -> str:
     """Share of the cause's gain that a rival reaches; a share next to none has no digits worth reading."""
     return percent(rival.gain_share) if rival.gain_share >= LEAST else f"under {percent(LEAST)}"
@@ -224,7 +229,6 @@ def untold(cause: CauseFound) -> str:
 def _cause(number: int, cause: CauseFound) -> list[str]:
     out = [f"  {number}. {name_of(cause.id)} ({cause.form}): {percent(cause.gain)} of the error, {sure(cause)}"]
     out.append(f"     {cause.explanation}")
-    for line in (numbers(cause), untold(cause), rivals(cause), f"check: {cause.check}" if cause.check else ""):
-        if line:
-            out.append(f"     {line}")
-    return out
+    check = f"check: {cause.check}" if cause.check else ""
+    said = (numbers(cause), untold(cause), rivals(cause), no_surer(cause), check)
+    return out + [f"     {line}" for line in said if line]

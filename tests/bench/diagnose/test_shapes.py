@@ -293,30 +293,49 @@ def test_a_size_is_as_sure_as_it_is_where_its_course_is_given() -> None:
         assert told_size(final, 0) == pytest.approx(sure)
 
 
-@pytest.mark.parametrize(("growth", "sure"), [(0.5, 1.0), (-0.9, 0.5)])
-def test_a_name_is_half_sure_where_its_shape_is_as_far_as_it_goes_from_the_first(growth: float, sure: float) -> None:
-    """A pad that hardens was a frame that each load makes stiffer, down to nothing; the 15 % left told of that."""
+@pytest.mark.parametrize(
+    ("compliance", "growth", "std", "rich", "gains", "sure", "why"),
+    [
+        (0.02, 0.5, 1e-4, True, [1.0], 1.0, ""),
+        (0.02, -0.9, 1e-4, True, [1.0], 0.5, "may stand for another cause"),
+        (0.02, 0.5, 0.01, True, [1.0], 0.25, "hardly tell its compliance"),
+        (None, 0.5, 1e-4, True, [1.0], 0.125, "its compliance is as far as it is sought"),
+        (0.02, 0.5, 1e-4, False, [1.0], 0.5, "comes twice"),
+        (0.02, 0.5, 1e-4, True, [0.01, 0.99], 0.65, "next to nothing beside the others"),
+        (None, -0.9, 1e-4, True, [1.0], 0.125, "its compliance is as far as it is sought"),
+    ],
+)
+def test_a_name_is_no_surer_than_its_size_its_shape_and_its_data_allow_and_says_why(
+    compliance: float | None, growth: float, std: float, rich: bool, gains: list[float], sure: float, why: str
+) -> None:
+    """A frame whose compliance is told or hardly told, or at its bound (None); that loosens, or stiffens as far as it
+    can: a pad that hardens was a frame that each load makes stiffer, down to nothing, and the 15 % left told of that;
+    in data that come back or do not; alone, or beside a far larger one."""
     frame = effect("frame_compliance")
-    cause = cause_of(frame, frame.form("loosening"), {"compliance": 0.02, "growth": growth})
+    form = frame.form("loosening")
+    most = next(p.upper for p in form.parameters if p.name == "compliance")
+    cause = cause_of(frame, form, {"compliance": compliance or most, "growth": growth})
     x = np.array([cause.start[p.name] for p in cause.fitted])
     structure = SimpleNamespace(
-        causes=(cause,),
+        causes=(cause, cause),
         of_cause=lambda index: slice(0, len(x)),
-        values=lambda x: [dict(cause.start)],
+        values=lambda x: [dict(cause.start)] * 2,
         coordinates=[Coordinate(p.name, p.lower, p.upper) for p in cause.fitted],
         lower=np.array([p.lower for p in cause.fitted]),
         upper=np.array([p.upper for p in cause.fitted]),
     )
-    final: Any = SimpleNamespace(structure=structure, x=x, covariance=lambda: 1e-8 * np.eye(len(x)))
+    final: Any = SimpleNamespace(structure=structure, x=x, covariance=lambda: std**2 * np.eye(len(x)))
     search: Any = SimpleNamespace(
         believed=SimpleNamespace(causes=()),
-        reach=SimpleNamespace(rich=True),
+        reach=SimpleNamespace(rich=rich),
         short=SimpleNamespace(position_mm=np.array([0.0, 2.0]), time_s=np.array([0.0, 1.0])),
     )
     measure = Measure(1e5, 1e3, 1e3, 1.0)
     stage = (SimpleNamespace(fit=SimpleNamespace(chi2=1e3, structure=structure)), [], measure)
     path: Any = SimpleNamespace(stage_of=lambda id_: stage)
-    assert found(search, path, final, [1.0])[0].confidence == sure
+    told = found(search, path, final, gains)[0]
+    assert told.confidence == sure
+    assert why in told.doubt and bool(told.doubt) == bool(why)
 
 
 def test_a_drift_that_settles_is_known_without_half_waves_of_its_rate():

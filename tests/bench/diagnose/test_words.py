@@ -9,6 +9,7 @@ import pytest
 
 from bench.diagnose.result import Number
 from bench.diagnose.words import NAMES, headline, lines, name_of, percent, untold, verdict
+from bench.report.diagnosis import diagnosis_page
 from sim.effects import all_effects
 from tests.bench.diagnose.small import PAD, made_up
 
@@ -67,6 +68,16 @@ def test_excluded_rivals_are_said_to_be_excluded_and_only_near_ones():
     assert "excluded, though near: backlash" in said and "cannot exclude" not in said
     far = replace(near, gain_share=0.1)
     assert "backlash" not in "\n".join(lines(made_up(causes=[replace(d.causes[0], alternatives=[far])])))
+
+
+def test_a_name_that_something_else_than_its_rivals_keeps_doubtful_says_what():
+    d = made_up()
+    assert "no surer" not in "\n".join(lines(d)) + diagnosis_page(d)
+    why = "its gap is as far as it is sought here"
+    doubted = made_up(causes=[replace(d.causes[0], confidence=0.125, doubt=why)])
+    assert f"no surer, for {why}" in "\n".join(lines(doubted))
+    assert f"no surer, for {why}" in diagnosis_page(doubted)
+    assert doubted.to_json()["causes"][0]["doubt"] == why
 
 
 def test_two_causes_are_both_named():
