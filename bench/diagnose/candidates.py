@@ -41,6 +41,8 @@ TURNS = (0.2, 0.35, 0.6, 1.0, 1.6)  # of the depth reached, after which a width 
 FRESH = 0.9  # of the depth reached, beyond which a softening pad must go for the first time in the run
 EVERY = tuple(0.1 * 1.1**k for k in range(24))  # of the run
 COARSE = 500  # samples in which what the load changes is counted: in finer ones noise would count
+MOST_SHIFT, FINE = 0.04, 0.05  # of the run, by which a force is sought shifted in time, and by halves of that down to
+# what lies between samples: no more than so many of them are nearer to each other
 LONGEST_REPORTED = 0.7  # of the depth, for errors of the position: longer ones are another elastic law
 
 
@@ -350,8 +352,24 @@ def starts(
         size = min(max(abs(best), least), 5 * abs(amplitude.typical) or abs(best))
         found.append(Start(trial.with_start(**{amplitude.name: _inside(sign * size, amplitude.lower, amplitude.upper)}),
                            promise))  # fmt: skip
+    found += [] if form.time_shift is None else _far_off(signatures, cause)
     found.sort(key=lambda s: -s.promise)
     return found[:most]
+
+
+def _far_off(signatures: Signatures, cause: Cause) -> list[Start]:
+    """Starts of what shifts the force in time by more than a ramp takes: a first-order signature knows of none."""
+    amplitude, shift = cause.amplitude, cause.form.time_shift
+    assert amplitude is not None and shift is not None
+    time_s = signatures.data.time_s
+    unit = amplitude.typical or 1.0
+    shift_s = float(np.max(np.abs(shift({**cause.start, amplitude.name: unit}, time_s) - time_s)))
+    longest_s, shortest_s = MOST_SHIFT * float(time_s[-1] - time_s[0]), float(np.quantile(np.diff(time_s), FINE))
+    twice = range(max(int(np.log2(longest_s / max(shortest_s, 1e-300))), 0) + 1)
+    sizes = [longest_s / 2.0**k * abs(unit) / max(shift_s, 1e-300) for k in twice]
+    at = [s for size in sizes for s in (size, -size) if amplitude.lower < s < amplitude.upper]
+    started = [cause.with_start(**{amplitude.name: size}) for size in at]
+    return [Start(c, signatures.whole(c)) for c in started]
 
 
 def _rippling(signatures: Signatures, effect: Effect, cause: Cause, most: int) -> list[Start]:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose import diagnose
+from bench.diagnose.candidates import Signatures, narrowed, starts
 from bench.diagnose.channel import faults, not_of_the_motion
 from bench.diagnose.data import Data, prepare
 from bench.diagnose.diagnose import believed_structure
@@ -25,6 +26,7 @@ from sim.model import Model
 from sim.pad import Pad
 from sim.relaxation import Relaxation
 from tests.bench.diagnose.small import measurement
+from tests.campaign.plan import Item
 from tests.truth.cases import Case, draw_case, pair_case
 
 QUIET: dict[str, Any] = {"jitter": "none", "noise_kind": "white", "own_clock": False, "law": "exponential"}
@@ -45,6 +47,18 @@ def in_two_shapes(c: Case, id: str) -> tuple[Search, Fit, Fit]:
     search, base = begun(c)
     first = search.ranked(base, only=[id])[0].fit
     return search, first, search.recurved(first)
+
+
+def test_a_clock_that_is_off_by_more_than_a_ramp_takes_is_sought_there():
+    """A case in which a campaign never looked at the clock: ramps of some milliseconds come too late by as much and
+    more, and what a small skew does to the force tells nothing of that."""
+    c = Item("pair", ("clock_skew", "permanent_set"), ("random_walk", "core_crushes"), (1.41, 0.537), 527769910).case()
+    search, base = begun(c)
+    clock = effects.effect("clock_skew")
+    first = starts(Signatures(search.short, base), clock, narrowed(clock.forms[0], search.reach))[0]
+    true_ppm = c.truth.parameters["clock_skew"]["skew"]
+    assert 0.3 < first.cause.start["skew"] / true_ppm < 3.0
+    assert first.promise > 0.1 * (base.chi2 - search.expected)
 
 
 @pytest.mark.long
