@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,11 +32,13 @@ LOWEST_RINGING_HZ, FREQUENCIES = 4.0, 32
 NEARBY, ABOUT = 7, 2.0  # frequencies about one that was found, and up to how many times it, either way
 SHORTEST, SHORTEST_MOVING = 0.12, 0.03  # of the longest period
 MOSTLY, NEARLY_ALL = 0.5, 0.8  # of the force samples, that are on the way; of the travel, that they show finely
-MANY = 20
+MANY = 24
 LONGEST_PERIOD = 1.6  # of the travel
 LONGEST_IN_PASSING = 0.35  # of the travel, where each depth is met once
 BENDS_AT = (0.08, 0.14, 0.2, 0.28, 0.38, 0.5, 0.7)  # of the depth reached
 MOVED_AT = tuple(k / 10 for k in range(1, 10))  # of the run, when something may have moved
+BETWEEN, KEPT = 3, 8  # further places between two of those; starts of which the one that keeps its promise comes first
+RUBS = (0.02, 0.05, 0.1)  # of the depth reached, by which the load goes past a place before what it does there
 TURNS = (0.2, 0.35, 0.6, 1.0, 1.6)  # of the depth reached, after which a width may repeat
 FRESH = 0.9  # of the depth reached, beyond which a softening pad must go for the first time in the run
 EVERY = tuple(0.1 * 1.1**k for k in range(24))  # of the run
@@ -172,6 +174,8 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         default = 0.6 * reach.force_N
     elif p.name == "limit" and p.unit == "N":
         starts = tuple(share * reach.force_N for share in (0.6, 0.8, 0.93, 0.985))
+    elif p.name == "rubs" and p.unit == "mm":
+        starts, default = tuple(share * reach.depth_mm for share in RUBS), RUBS[0] * reach.depth_mm
     elif p.name == "turn":  # worn where it is used, or once about after each turn of what drives it
         upper = min(upper, LONGEST_PERIOD * reach.depth_mm)
         starts = tuple(share * reach.depth_mm for share in TURNS)
@@ -341,10 +345,9 @@ def starts(
         return _rippling(signatures, effect, cause, most)
     amplitude = cause.amplitude
     found: list[Start] = []
-    every = list(combinations(form))
-    if len(every) > MANY and form.name != effect.forms[0].name:
+    if len(list(combinations(form))) > MANY and form.name != effect.forms[0].name:
         return []  # it is tried from where the family's first form has ended
-    for values in every:
+    for values in combinations(_finely(form)):
         trial = cause.with_start(**values)
         promise, best = signatures.of(trial)
         least = 0.05 * abs(amplitude.typical)
@@ -354,7 +357,24 @@ def starts(
                            promise))  # fmt: skip
     found += [] if form.time_shift is None else _far_off(signatures, cause)
     found.sort(key=lambda s: -s.promise)
+    if any(p.bend for p in form.parameters):  # of many that promise as much, the one that keeps it comes first
+        first = max(found[:KEPT], key=lambda s: signatures.whole(s.cause))
+        found.sort(key=lambda s: s is not first)
     return found[:most]
+
+
+def _finely(form: Form) -> Form:
+    """The form with the depth at which it bends begun at more places: each depth held is on one side of it, and what a
+    fit does on its way past one is a leap."""
+    fine = tuple(replace(p, starts=_between(p.starts)) if p.bend else p for p in form.parameters)
+    return replace(form, parameters=fine)
+
+
+def _between(values: Sequence[float]) -> tuple[float, ...]:
+    """Values with others in between, in even ratios."""
+    share = np.arange(BETWEEN + 1) / (BETWEEN + 1)
+    between = [float(a ** (1.0 - s) * b**s) for a, b in pairwise(values) for s in share]
+    return (*between, *values[-1:])
 
 
 def _far_off(signatures: Signatures, cause: Cause) -> list[Start]:

@@ -62,6 +62,20 @@ def test_a_clock_that_is_off_by_more_than_a_ramp_takes_is_sought_there():
 
 
 @pytest.mark.long
+def test_a_play_in_which_the_probe_hangs_is_found_whichever_depths_are_held():
+    """Each depth held is before or behind the one at which the load lifts the probe, so that no slope leads from one
+    place to the next: of these ten three were found while few places were tried."""
+    found = []
+    for seed in range(10):
+        c = draw_case(seed, ("backlash",), 1.2, "hangs", protocol="staircase", rate_hz=300.0)
+        search, base = begun(c)
+        if base.chi2 > 1.2 * search.expected:
+            trial = search.ranked(base, only=["backlash"])[0]
+            found.append(trial.cause.form.name == "lifted" and trial.fit.chi2 < 1.4 * search.expected)
+    assert len(found) > 7 and np.mean(found) > 0.85
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 3])
 def test_a_form_whose_valley_is_apart_from_the_best_ones_is_found(seed):
     """From where a joint that opens has ended no way leads to one that has closed."""
