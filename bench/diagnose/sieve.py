@@ -262,15 +262,19 @@ class Sieve:
 
     def _kept(self, fit: Fit, start: Start, known: Array) -> Trial | None:
         """A few steps from a start, the sensitivities of the pad's numbers known. Where it promises to explain what is
-        left, and does not keep that, it has changed them: a frame's way is most of the pad's in another place."""
+        left, and does not keep that, it has changed them: a frame's way is most of the pad's in another place; or its
+        shape was led away before the pad had followed: where each depth held is before or behind a bend, a slope
+        tells nothing of what comes next."""
         trial = self._joined(fit, start.cause, FEW, known)
         left = unexplained(fit.chi2, self.expected)
         promised = min(start.promise, left)
         told = np.isfinite(start.promise) and promised > PROMISES * left
-        if trial is None or not told or fit.chi2 - trial.fit.chi2 > KEEPS * promised:
-            return trial
-        other = self._joined(fit, start.cause, FEW, None)
-        return other if other is not None and other.score < trial.score else trial
+        for again in (self._joined, self._followed):
+            if trial is None or not told or fit.chi2 - trial.fit.chi2 > KEEPS * promised:
+                break
+            other = again(fit, start.cause, FEW, None)
+            trial = other if other is not None and other.score < trial.score else trial
+        return trial
 
     def _widened(
         self, fit: Fit, trials: list[Trial], found: list[Start], family: list[Form], known: Array
@@ -374,6 +378,18 @@ class Sieve:
         structure = fit.structure.with_cause(cause)
         own = structure.x(fit.x[: len(structure.pad.coordinates)])[structure.of_cause(len(structure.causes) - 1)]
         return self._solved(structure, extended(fit, own), steps, known)
+
+    def _followed(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
+        """As `_joined`, from where the pad and the cause's size have followed, its shape held as it begins."""
+        held = tuple(replace(p, fixed=not p.amplitude) for p in cause.form.parameters)
+        beside = self._joined(
+            fit, cause_of(cause.effect, replace(cause.form, parameters=held), cause.start), steps, known
+        )
+        if beside is None:
+            return None
+        values, pad = beside.fit.structure.values(beside.fit.x), beside.fit.x[: len(fit.structure.pad.coordinates)]
+        structure = fit.structure.with_cause(cause.with_start(**values[-1]))
+        return self._solved(structure, structure.x(pad, values, beside.fit.of_run), steps, known)
 
     def _solved(self, structure: Structure, x: Array, steps: int, known: Array | None) -> Trial | None:
         if not np.isfinite(force_at(self.short, structure, x)).all():

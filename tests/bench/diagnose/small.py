@@ -16,6 +16,7 @@ from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.refit import Fit, onto, refit
 from bench.diagnose.result import Alternative, CauseFound, Number, Remainder
+from bench.diagnose.search import Search
 from bench.protocol import Protocol
 from bench.recording.types import Measurement
 from sim.effects import effect
@@ -40,6 +41,15 @@ def measurement(c: Case) -> Measurement:
     stamps = c.time_s if c.force_time_s is None else c.force_time_s
     where, felt = np.isfinite(c.position_mm), np.isfinite(c.force_N)
     return Measurement("case", c.time_s[where], c.position_mm[where], stamps[felt], c.force_N[felt])
+
+
+def begun(c: Case) -> tuple[Search, Fit]:
+    """A search, and the believed structure refitted."""
+    m = measurement(c)
+    p = prepare(m, not_of_the_motion(m, faults(m.force_N)).good)
+    structure = believed_structure(Model.from_dict(c.believed), p)
+    search = Search(p, structure, lambda _: None)
+    return search, search.base([structure.pad.x()])
 
 
 @functools.cache

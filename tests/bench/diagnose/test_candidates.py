@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.diagnose.candidates import Reach, _scanned, alike, forms, narrowed
+from bench.diagnose import diagnose
+from bench.diagnose.candidates import Reach, Signatures, _scanned, alike, forms, narrowed, starts
 from bench.diagnose.late import LATE, as_late, lateness_s
 from bench.diagnose.numbers import PadNumbers, Structure, cause_of
 from bench.diagnose.refit import Fit
@@ -13,8 +14,12 @@ from bench.diagnose.ripple import ripples
 from sim.effects import effect
 from sim.effects.base import Active
 from sim.elastic import Polynomial
+from sim.model import Model
 from sim.pad import Cascade, Pad
 from sim.relaxation import Relaxation
+from tests.bench.diagnose.small import begun, measurement
+from tests.campaign.plan import Item
+from tests.truth.cases import draw_case
 
 
 @pytest.mark.parametrize("rate_Hz", [5.0, 8.0, 15.0, 30.0, 200.0, 2000.0])
@@ -34,6 +39,54 @@ def test_ringing_is_sought_at_all_frequencies_that_the_data_can_show(form, rate_
     beside = {values["frequency"] for values in _scanned(shape, {"frequency": near})}
     assert len(beside) < len(found) and min(beside) < 0.6 * near and max(beside) > 1.7 * near
     assert min(abs(np.log(f / near)) for f in beside) < 0.01
+
+
+def test_a_clock_that_is_off_by_more_than_a_ramp_takes_is_sought_there():
+    """A case in which a campaign never looked at the clock: ramps of some milliseconds come too late by as much and
+    more, and what a small skew does to the force tells nothing of that."""
+    c = Item("pair", ("clock_skew", "permanent_set"), ("random_walk", "core_crushes"), (1.41, 0.537), 527769910).case()
+    search, base = begun(c)
+    clock = effect("clock_skew")
+    first = starts(Signatures(search.short, base), clock, narrowed(clock.forms[0], search.reach))[0]
+    true_ppm = c.truth.parameters["clock_skew"]["skew"]
+    assert 0.3 < first.cause.start["skew"] / true_ppm < 3.0
+    assert first.promise > 0.1 * (base.chi2 - search.expected)
+
+
+@pytest.mark.long
+def test_a_play_in_which_the_probe_hangs_is_found_whichever_depths_are_held():
+    """Each depth held is before or behind the one at which the load lifts the probe, so that no slope leads from one
+    place to the next: of these ten three were found while few places were tried."""
+    found = []
+    for seed in range(10):
+        c = draw_case(seed, ("backlash",), 1.2, "hangs", protocol="staircase", rate_hz=300.0)
+        search, base = begun(c)
+        if base.chi2 > 1.2 * search.expected:
+            trial = search.ranked(base, only=["backlash"])[0]
+            found.append(trial.cause.form.name == "lifted" and trial.fit.chi2 < 1.4 * search.expected)
+    assert len(found) > 7 and np.mean(found) > 0.85
+
+
+@pytest.mark.slow
+def test_a_start_is_worth_what_it_promises_though_the_pad_has_gone_far():
+    """A case that a campaign called unexplained: with the pad where it had gone to without the play, the first steps
+    led away from the depth at which the load lifts the probe, which was the right one."""
+    c = Item("pair", ("backlash", "damage"), ("hangs", "hyperbolic"), (1.19, 1.65), 2007262211).case()
+    search, base = begun(c)
+    trial = search.ranked(base, only=["backlash"])[0]
+    assert trial.cause.form.name == "lifted"
+    assert trial.fit.chi2 - search.expected < 0.2 * (base.chi2 - search.expected), "the rest is damage"
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_a_play_in_which_the_probe_hangs_is_found_beside_damage():
+    c = Item("pair", ("backlash", "damage"), ("hangs", "hyperbolic"), (1.19, 1.65), 2007262211).case()
+    said = diagnose(measurement(c), Model.from_dict(c.believed))
+    assert said.verdict == "explained"
+    assert [cause.id for cause in said.causes] == ["backlash", "damage"]
+    for cause, name in zip(said.causes, ("gap", "rate"), strict=True):
+        assert cause.parameters[name].value == pytest.approx(c.truth.parameters[cause.id][name], rel=0.1)
 
 
 @pytest.mark.parametrize(("travel_mm", "sought"), [(3.0, True), (3e-3, False)])

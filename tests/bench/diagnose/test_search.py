@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose import diagnose
-from bench.diagnose.candidates import Signatures, narrowed, starts
-from bench.diagnose.channel import faults, not_of_the_motion
-from bench.diagnose.data import Data, prepare
-from bench.diagnose.diagnose import believed_structure
+from bench.diagnose.data import Data
 from bench.diagnose.numbers import PadNumbers, Structure, cause_of
 from bench.diagnose.path import Trial
 from bench.diagnose.refit import Fit, chi2, force_at, refit
@@ -25,21 +22,11 @@ from sim.elastic import Exponential
 from sim.model import Model
 from sim.pad import Pad
 from sim.relaxation import Relaxation
-from tests.bench.diagnose.small import measurement
-from tests.campaign.plan import Item
+from tests.bench.diagnose.small import begun, measurement
 from tests.truth.cases import Case, draw_case, pair_case
 
 QUIET: dict[str, Any] = {"jitter": "none", "noise_kind": "white", "own_clock": False, "law": "exponential"}
 """Of a case that shows little but what is hidden in it."""
-
-
-def begun(c: Case) -> tuple[Search, Fit]:
-    """A search, and the believed structure refitted."""
-    m = measurement(c)
-    p = prepare(m, not_of_the_motion(m, faults(m.force_N)).good)
-    structure = believed_structure(Model.from_dict(c.believed), p)
-    search = Search(p, structure, lambda _: None)
-    return search, search.base([structure.pad.x()])
 
 
 def in_two_shapes(c: Case, id: str) -> tuple[Search, Fit, Fit]:
@@ -47,32 +34,6 @@ def in_two_shapes(c: Case, id: str) -> tuple[Search, Fit, Fit]:
     search, base = begun(c)
     first = search.ranked(base, only=[id])[0].fit
     return search, first, search.recurved(first)
-
-
-def test_a_clock_that_is_off_by_more_than_a_ramp_takes_is_sought_there():
-    """A case in which a campaign never looked at the clock: ramps of some milliseconds come too late by as much and
-    more, and what a small skew does to the force tells nothing of that."""
-    c = Item("pair", ("clock_skew", "permanent_set"), ("random_walk", "core_crushes"), (1.41, 0.537), 527769910).case()
-    search, base = begun(c)
-    clock = effects.effect("clock_skew")
-    first = starts(Signatures(search.short, base), clock, narrowed(clock.forms[0], search.reach))[0]
-    true_ppm = c.truth.parameters["clock_skew"]["skew"]
-    assert 0.3 < first.cause.start["skew"] / true_ppm < 3.0
-    assert first.promise > 0.1 * (base.chi2 - search.expected)
-
-
-@pytest.mark.long
-def test_a_play_in_which_the_probe_hangs_is_found_whichever_depths_are_held():
-    """Each depth held is before or behind the one at which the load lifts the probe, so that no slope leads from one
-    place to the next: of these ten three were found while few places were tried."""
-    found = []
-    for seed in range(10):
-        c = draw_case(seed, ("backlash",), 1.2, "hangs", protocol="staircase", rate_hz=300.0)
-        search, base = begun(c)
-        if base.chi2 > 1.2 * search.expected:
-            trial = search.ranked(base, only=["backlash"])[0]
-            found.append(trial.cause.form.name == "lifted" and trial.fit.chi2 < 1.4 * search.expected)
-    assert len(found) > 7 and np.mean(found) > 0.85
 
 
 @pytest.mark.long
