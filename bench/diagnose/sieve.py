@@ -381,10 +381,9 @@ class Sieve:
 
     def _followed(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
         """As `_joined`, from where the pad and the cause's size have followed, its shape held as it begins."""
-        held = tuple(replace(p, fixed=not p.amplitude) for p in cause.form.parameters)
-        beside = self._joined(
-            fit, cause_of(cause.effect, replace(cause.form, parameters=held), cause.start), steps, known
-        )
+        shape = tuple(replace(p, fixed=not p.amplitude) for p in cause.form.parameters)
+        held = cause_of(cause.effect, replace(cause.form, parameters=shape), cause.start)
+        beside = self._joined(fit, held, steps, known)
         if beside is None:
             return None
         values, pad = beside.fit.structure.values(beside.fit.x), beside.fit.x[: len(fit.structure.pad.coordinates)]
