@@ -9,8 +9,8 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
 - `linear`: 1 − rate · travel, down to 0.02.
 - `power`: (1 + k rate · travel)^(−1/k): between linear (k = −1), exponential (0) and hyperbolic (1), and beyond both:
   Kachanov's law, which ends in rupture, has k = −3 or so.
-- `weibull`: e^(−(rate · travel)^shape): a bundle of fibres of which each breaks at its own travel. Above 1 the pad is
-  whole at first and fails within some travel; below 1 it goes on ever slower.
+- `weibull`: e^(−rate · s (travel/s)^shape), s = `at_travel`: a bundle of fibres of which each breaks at its own travel.
+  Above 1 the pad is whole at first and fails within some travel; below 1 it goes on ever slower.
 - `energy`: as exponential, in the travel weighed by (n + 1) (δ/reach)^n, as the work of a spring F ∝ δ^n: deep travel
   counts more, and a stroke down to `reach` as much as elsewhere.
 - `threshold`: e^(−rate · travel/(1 − spared)) of the travel deeper than `spared` times `reach` alone: what stays above
@@ -30,7 +30,7 @@ it exceeds a dead band (`dead_band`, a choice and not fitted).
   back to it by then or not, as cycles are counted on a machine that knows of strokes alone (ISO 3385, which pounds
   foams to a given stroke).
 
-`rate` is what a mm of travel takes at first, of the stiffness; that of `weibull`, one over the travel that leaves 1/e.
+`rate` is what a mm of travel takes at first, of the stiffness; that of `weibull`, the mean up to `at_travel`.
 In `loss` and `creep` it is multiplied by `weighs`: a diagnosis states by it what the strokes of its data took, in the
 mean over their travel, however deep they went and long they lasted.
 
@@ -121,9 +121,9 @@ def power(dt: float, depth: float, state: State, p: State) -> float:
 
 @block
 def weibull(dt: float, depth: float, state: State, p: State) -> float:
-    """Factor on F^e; p = (rate, shape, dead_band)."""
-    state[_LAST], state[_TRAVEL] = loaded(depth, p[2], state[_LAST], state[_TRAVEL])
-    return max(_LEAST, math.exp(-((p[0] * state[_TRAVEL]) ** p[1])))
+    """Factor on F^e; p = (rate, shape, at_travel, dead_band)."""
+    state[_LAST], state[_TRAVEL] = loaded(depth, p[3], state[_LAST], state[_TRAVEL])
+    return max(_LEAST, math.exp(-p[0] * p[2] * (state[_TRAVEL] / p[2]) ** p[1]))
 
 
 @block
@@ -265,6 +265,7 @@ EFFECT = Effect(
             parameters=(
                 _RATE,
                 Parameter("shape", "1", 0.3, 6.0, 1.0, "1: exponential; above, whole at first", starts=(0.6, 2.0)),
+                Parameter("at_travel", "mm", 1e-3, 1e9, 20.0, "travel up to which `rate` is the mean", fixed=True),
                 _DEAD_BAND,
             ),
             sought=False,

@@ -17,9 +17,9 @@
   play of ± limit that the depth drags along; `set` is the mean of what has sunk under the deepest and of what stays (W.
   Prager, A new method of analyzing stresses and strains in work-hardening plastic solids, J. Appl. Mech. 23, 1956,
   493–496: the back stress of what has hardened).
-- `lifting`: as the probe goes back, by set · deepest · (1 − e^(−(deepest − y)/within)), and it stays: the law is the
-  pad's as it is pressed first, set in it, as of what is read from the curve of unloading (W. C. Oliver, G. M. Pharr, J.
-  Mater. Res. 7, 1992, 1564–1583).
+- `lifting`: as the probe goes back, by set · deepest · (1 − e^(−(deepest − y)/within)) over the same of `reach`, so
+  that `set` is what stays of a stroke of that depth; the law is the pad's as it is pressed first, set in it, as of what
+  is read from the curve of unloading (W. C. Oliver, G. M. Pharr, J. Mater. Res. 7, 1992, 1564–1583).
 - `pounded`: towards set · deepest with the way pressed, set · deepest · (1 − e^(−W/way)), W = ∫ max(dy, 0) below the
   sunken surface: what many presses make thinner (ISO 3385, Flexible cellular polymeric materials: determination of
   fatigue by constant-load pounding).
@@ -126,9 +126,10 @@ def springing(dt: float, y: float, state: State, p: State) -> float:
 
 @block
 def lifting(dt: float, y: float, state: State, p: State) -> float:
-    """Depth below the sinking surface; p = (set, within); state: deepest, what has sunk."""
+    """Depth below the sinking surface; p = (set, within, reach); state: deepest, what has sunk."""
     state[_DEEPEST] = max(state[_DEEPEST], y)
-    sunk = -p[0] * state[_DEEPEST] * math.expm1((max(y, 0.0) - state[_DEEPEST]) / p[1])
+    come = math.expm1((max(y, 0.0) - state[_DEEPEST]) / p[1]) / math.expm1(-p[2] / p[1])
+    sunk = p[0] * state[_DEEPEST] * come
     state[_SUNK] = max(state[_SUNK], sunk)
     return y - state[_SUNK]
 
@@ -217,6 +218,7 @@ EFFECT = Effect(
             parameters=(
                 _SET,
                 Parameter("within", "mm", 0.005, 20.0, 0.3, "way back on which it comes", starts=(0.1, 0.5)),
+                Parameter("reach", "mm", 1e-3, 100.0, 1.0, "depth of a stroke that leaves `set`", fixed=True),
             ),
             blocks={"depth": lifting},
             state=(0.0,) * 2,

@@ -176,6 +176,17 @@ class TestWhatTheNinthShowed:
         sunk = 0.2 * np.minimum(1.5, down + 0.5)  # 0.3 mm under the deepest, 0.1 mm at the end: 0.1 · 2 in the mean
         assert_allclose(force[400:], K * np.maximum(down - sunk, 0.0), atol=1e-9)
 
+    @pytest.mark.parametrize("within", [0.05, 0.3, 20.0])
+    def test_what_stays_of_a_stroke_to_reach_is_the_set_however_soon_it_comes(self, within: float) -> None:
+        x = ramp(2.0, 401)
+        lifts = active("permanent_set", "lifting", set=0.1, within=within, reach=2.0)
+        force = simulate(LINEAR, [lifts], np.arange(x.size) * 0.01, x)
+        assert_allclose(force[:401], K * x[:401], atol=1e-9)  # nothing, until it is let go
+        down = x[400:]
+        come = np.expm1((down - 2.0) / within) / np.expm1(-2.0 / within)
+        assert come[-1] == pytest.approx(1.0)
+        assert_allclose(force[400:], K * np.maximum(down - 0.2 * come, 0.0), atol=1e-9)
+
     def test_water_that_stays_away_until_the_pad_is_let_go(self) -> None:
         t = 0.01 * np.arange(6000)
         x = np.select([t < 1.0, t < 2.0, t < 52.0], [2.0, 1.0, -1.0], 1.0)
@@ -257,6 +268,16 @@ class TestWhatGoesOnByItself:
         force = simulate(AIR, [wave], np.arange(x.size) * 0.01, x)
         deepest = np.maximum.accumulate(x)
         assert_allclose(force, 0.1 * (1.5 - 0.25 * deepest) * np.sin(2 * np.pi * x / 0.7 + 0.3), atol=1e-9)
+
+
+@pytest.mark.parametrize("shape", [0.6, 1.0, 3.0])
+def test_fibres_that_break_cost_the_rate_in_the_mean_up_to_a_travel(shape: float) -> None:
+    """Two strokes of 1 mm: what they take of the stiffness, as a logarithm, is 0.2 at 2 mm whatever the shape."""
+    x = np.concatenate([ramp(1.0, 501), ramp(1.0, 501)[1:]])
+    fibres = active("damage", "weibull", rate=0.1, shape=shape, at_travel=2.0, dead_band=0.0)
+    force = simulate(LINEAR, [fibres], np.arange(x.size) * 1e-3, x)
+    assert_allclose(force[500], K * math.exp(-0.2 * 0.5**shape), rtol=1e-9)
+    assert_allclose(force[1500], K * math.exp(-0.2), rtol=1e-9)
 
 
 def test_damage_with_the_time_under_load_goes_on_while_it_is_held() -> None:

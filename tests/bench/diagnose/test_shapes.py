@@ -361,3 +361,23 @@ def test_softening_whose_best_shape_is_at_its_bound_is_softening():
     mass = next(cause for cause in said.causes if cause.id == "inertia").parameters["mass"].value
     assert mass == pytest.approx(c.truth.parameters["inertia"]["mass"], rel=0.1)
     assert said.held_out_after < 1.05 * said.noise_floor
+
+
+@pytest.mark.slow
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("id", "number", "shape", "size", "seed"),
+    [
+        ("permanent_set", "set", "slow_presses", 0.578, 358545935),
+        ("damage", "rate", "logarithmic", 0.231, 269399305),
+    ],
+)
+def test_a_number_is_the_same_thing_in_all_shapes_that_fit_as_well(id, number, shape, size, seed):
+    """Two cases of a campaign in which one number was three times its value uncertain, and the name 12 % sure: a shape
+    that fits as well had another meaning of it, a set of a stroke deeper than any, a rate of the very first travel."""
+    c = Item("single", (id,), (shape,), (size,), seed).case()
+    said = diagnose(measurement(c), Model.from_dict(c.believed)).causes[0]
+    true, told = c.truth.parameters[id][number], said.parameters[number]
+    assert said.id == id and said.confidence > 0.75
+    assert told.std < 0.25 * true
+    assert abs(told.value - true) < max(0.1 * true, 2.0 * told.std)
