@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bench.identify.uncertainty import sandwich
 
 from .data import Data
+from .gauge import gauged
 from .numbers import Coordinate
 from .refit import Fit, chi2, errors, jacobian, reduced, refit
 from .shapes import Member, families, scores, stand_in
@@ -92,7 +93,8 @@ def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
     out = np.zeros(len(fit.x))
     lead, kept = stand_in(short, fit)
     every = fit.structure.values(fit.x)
-    for index, members in enumerate(families(short, lead, range(len(kept)))):
+    for index, family in enumerate(families(short, lead, range(len(kept)))):
+        members = [family[0], *(_stated(short, m) for m in family[1:])]
         place, bare = kept[index], refit(short, *reduced(lead, index), STEPS_WITHOUT, NEARLY)
         plain, rough = _weights(scores(short, [*members, Member(bare, -1)]))
         at = fit.structure.of_cause(place)
@@ -110,6 +112,13 @@ def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
             inexact = sum(w * (min(a.step, a.far) ** 2 + a.more) for w, a in zip(rough[1:], away, strict=True))
             out[position] = max(as_told, inexact)
     return out
+
+
+def _stated(short: Data, member: Member) -> Member:
+    """A shape with its numbers as they are stated, and their matrix."""
+    stated = gauged(short, member.fit)
+    same = stated.structure is member.fit.structure
+    return member if same else replace(member, fit=refit(short, stated.structure, stated.x, 1, NEARLY))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from bench.diagnose.modes import as_believed
 from bench.diagnose.numbers import Coordinate, cause_of
 from bench.diagnose.path import Measure
 from bench.diagnose.refit import Fit, onto, refit
-from bench.diagnose.shapes import departed, reshaped, steadier
+from bench.diagnose.shapes import Member, departed, reshaped, steadier
 from bench.diagnose.spread import covariance, of_the_noise
 from bench.diagnose.verdict import found, told_size
 from sim.effects import effect
@@ -222,6 +222,7 @@ def test_a_number_of_which_the_stand_in_says_nothing_widens_none(monkeypatch):
         monkeypatch.setattr(spread, "scores", lambda short, members: np.zeros(3))
         monkeypatch.setattr(spread, "reduced", lambda lead, index: (structure, np.ones(0)))
         monkeypatch.setattr(spread, "refit", lambda *args: fit)
+        monkeypatch.setattr(spread, "_stated", lambda short, member: member)
         added = spread._of_the_shapes(None, fit, np.array([np.float64(1e250)]))
         assert np.isfinite(added).all() and added[0] >= 0.5 * spread.FAR**2
 
@@ -361,6 +362,17 @@ def test_softening_whose_best_shape_is_at_its_bound_is_softening():
     mass = next(cause for cause in said.causes if cause.id == "inertia").parameters["mass"].value
     assert mass == pytest.approx(c.truth.parameters["inertia"]["mass"], rel=0.1)
     assert said.held_out_after < 1.05 * said.noise_floor
+
+
+def test_what_is_lost_by_what_relaxes_is_told_in_the_mean_over_the_data_beside_other_shapes_too():
+    """The rate of a stroke to two thirds of `reach` that is held for `lasts` is no other shape's rate."""
+    c, p, fit = fitted("damage", "by_loss", "loss", 1.5)
+    raw, told = Member(fit, 0).values["rate"], spread._stated(p.short, Member(fit, 0))
+    true = c.truth.parameters["damage"]["rate"]
+    assert abs(told.values["rate"] / true - 1.0) < 0.5 * abs(raw / true - 1.0)
+    assert told.variances["rate"] / told.values["rate"] ** 2 == pytest.approx(
+        Member(fit, 0).variances["rate"] / raw**2, rel=0.5
+    )
 
 
 @pytest.mark.slow
