@@ -42,6 +42,8 @@ FORETOLD = 0.2  # of a gain: first-order signatures promise so much of it at the
 HOPEFUL, CLOSE = 0.1, 0.6  # of the best one's gain: families that are worth the next round, and their second shapes
 AS_GOOD = 0.5  # of the best start's promise: another form's own start is tried too
 PROMISES, KEEPS = 0.5, 0.5  # of what is left unexplained; and of its promise: a start that keeps less steps anew
+STRAYED = 5.0  # times as fast or as slow as any believed: such a mode has taken a cause's place
+ASTRAY = 0.1  # of what is left, that one promises whose first steps have left more than there was
 NEAR = 2.0  # times χ² before: another law that is no farther off after a few steps takes more
 KNEES = ("soft",)  # forms that say more than that the greatest forces are at a ceiling
 ROUNDS, MUCH = 3, 0.1  # of more steps for it, and the share of χ² by which they must fall for another
@@ -251,7 +253,7 @@ class Sieve:
         # another law begins beside the fit and not at it: it takes more steps to tell what it is worth
         near = [t is not None and t.cause.form.amend is not None and t.fit.chi2 < NEAR * fit.chi2 for t in joined]
         tried = [self._carried(t, MORE) if close else t for t, close in zip(joined, near, strict=True) if t is not None]
-        tried += self._from_believed(tried, *believed)
+        tried += self._from_believed(fit, tried, *believed)
         for s in chosen:
             if s.pad is not None:
                 structure = fit.structure.with_cause(s.cause)
@@ -268,9 +270,11 @@ class Sieve:
         trial = self._joined(fit, start.cause, FEW, known)
         left = unexplained(fit.chi2, self.expected)
         promised = min(start.promise, left)
-        told = np.isfinite(start.promise) and promised > PROMISES * left
+        if trial is None or not np.isfinite(start.promise):
+            return trial
+        hopes = PROMISES if trial.fit.chi2 < fit.chi2 else ASTRAY
         for again in (self._joined, self._followed):
-            if trial is None or not told or fit.chi2 - trial.fit.chi2 > KEEPS * promised:
+            if promised <= hopes * left or fit.chi2 - trial.fit.chi2 > KEEPS * promised:
                 break
             other = again(fit, start.cause, FEW, None)
             trial = other if other is not None and other.score < trial.score else trial
@@ -365,14 +369,23 @@ class Sieve:
         x = fit.structure.x(pad, fit.structure.values(fit.x), fit.of_run)
         return pad, jacobian(self.short, fit.structure, x)[:, : len(x) - fit.structure.tail]
 
-    def _from_believed(self, tried: Sequence[Trial], pad: Array, known: Array) -> list[Trial]:
+    def _from_believed(self, fit: Fit, tried: Sequence[Trial], pad: Array, known: Array) -> list[Trial]:
         """The best of some starts again, with the pad as it was believed: a refit may have run far from it."""
         if not tried:
             return []
         best = min(tried, key=lambda t: t.score).fit
         start = best.structure.x(pad, best.structure.values(best.x), best.of_run)
         again = self._solved(best.structure, start, FEW, known)
-        return [] if again is None else [again]
+        if again is None:
+            return []
+        return [self._falling(again) if self._strayed(fit) else again]
+
+    def _strayed(self, fit: Fit) -> bool:
+        """Whether a mode of a fit's pad is another one by far than any that was believed: then the way back is long."""
+        order, end = self.believed.pad.pad.relaxation.order, len(fit.structure.pad.coordinates)
+        rates, believed = fit.x[end - order : end], self.believed.pad.x()[len(self.believed.pad.coordinates) - order :]
+        off = np.abs(rates[:, None] - believed[None, :]).min(axis=1, initial=np.inf)
+        return bool(np.any(off > np.log(STRAYED)))
 
     def _joined(self, fit: Fit, cause: Cause, steps: int, known: Array | None) -> Trial | None:
         structure = fit.structure.with_cause(cause)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bench.diagnose import diagnose
+from bench.diagnose import diagnose, sieve
 from bench.diagnose.candidates import Reach, Signatures, _scanned, alike, forms, narrowed, starts
 from bench.diagnose.late import LATE, as_late, lateness_s
 from bench.diagnose.numbers import PadNumbers, Structure, cause_of
-from bench.diagnose.refit import Fit
+from bench.diagnose.refit import Fit, refit
 from bench.diagnose.ripple import ripples
+from bench.diagnose.search import Search
 from sim.effects import effect
 from sim.effects.base import Active
 from sim.elastic import Polynomial
@@ -87,6 +90,36 @@ def test_a_play_in_which_the_probe_hangs_is_found_beside_damage():
     assert [cause.id for cause in said.causes] == ["backlash", "damage"]
     for cause, name in zip(said.causes, ("gap", "rate"), strict=True):
         assert cause.parameters[name].value == pytest.approx(c.truth.parameters[cause.id][name], rel=0.1)
+
+
+def gone_far() -> tuple[Search, Fit]:
+    """A search among data of damage and of relaxation that depends on the depth; and a fit of the latter of which two
+    modes of the pad are none that was believed, as a campaign's search had one."""
+    ids, shapes = ("damage", "depth_dependent_relaxation"), ("all_the_way", "under_pressure")
+    search, base = begun(Item("pair", ids, shapes, (1.084, 1.918), 2051734287).case())
+    found = effect("depth_dependent_relaxation")
+    cause = cause_of(found, found.form("exponential"), {"slope": -0.2})
+    structure = base.structure.with_cause(cause)
+    far = replace(base.pad, relaxation=Relaxation((0.55, 0.0003, 0.264), (8000.0, 50.0, 3.1)))
+    x = structure.x(replace(structure.pad, pad=far).x(), [cause.start], base.of_run)
+    return search, refit(search.short, structure, x, 60, 1e-8)
+
+
+def test_damage_is_found_although_modes_of_the_pad_have_gone_far_in_its_place():
+    """From there damage leaves a fifteenth of what there is; with the pad as it was believed, next to nothing."""
+    search, fit = gone_far()
+    second = search.ranked(fit, only=["damage"])[0].fit
+    assert second.chi2 - search.expected < 0.02 * (fit.chi2 - search.expected)
+
+
+def test_first_steps_that_lead_to_more_than_there_was_are_taken_anew():
+    search, fit = gone_far()
+    signatures, softening = Signatures(search.short, fit), effect("stress_softening")
+    start = starts(signatures, softening, narrowed(softening.form("rejoining"), search.reach))[0]
+    led = search._joined(fit, start.cause, sieve.FEW, signatures.jacobian)
+    kept = search._kept(fit, start, signatures.jacobian)
+    assert kept is not None and led is not None
+    assert kept.fit.chi2 < fit.chi2 < led.fit.chi2
 
 
 @pytest.mark.parametrize(("travel_mm", "sought"), [(3.0, True), (3e-3, False)])
