@@ -170,7 +170,7 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
         default = 0.03 * reach.force_N
     elif p.name == "at_change":
         default = 0.5 * reach.changes_N
-    elif p.name == "at_travel":  # half of what the changes are on the way in, and there the half
+    elif p.name == "at_travel":  # half of the travel in, which is half of all changes
         default = 0.25 * reach.changes_N * reach.depth_mm / reach.force_N
     elif p.name == "at_force":
         default = 0.6 * reach.force_N

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -265,12 +264,12 @@ def _at_the_most(search: Search, final: Fit, index: int, gain: float, named: int
 
 def _of_the_size(final: Fit, index: int) -> str:
     """What is wrong with the size of a fit's cause where its name cannot be sure."""
-    cause, numbers = final.structure.causes[index], described(final, index)[2]
-    if cause.amplitude is None:
+    size, numbers = final.structure.causes[index].amplitude, described(final, index)[2]
+    if size is None:
         return ""
-    name = cause.amplitude.name
-    told = math.isfinite(numbers[name].std)
-    return f"these data hardly tell its {name}" if told else f"its {name} is as far as it is sought here"
+    at = 1e-6 * (size.upper - size.lower)
+    inside = size.lower + at < numbers[size.name].value < size.upper - at
+    return f"these data hardly tell its {size.name}" if inside else f"its {size.name} is as far as it is sought here"
 
 
 def told_size(final: Fit, index: int) -> float:
