@@ -266,14 +266,16 @@ class Sieve:
         """A few steps from a start, the sensitivities of the pad's numbers known. Where it promises to explain what is
         left, and does not keep that, it has changed them: a frame's way is most of the pad's in another place; or its
         shape was led away before the pad had followed: where each depth held is before or behind a bend, a slope
-        tells nothing of what comes next."""
+        tells nothing of what comes next. Data that meet their depths once are left at that: there the long way leads to
+        any shape, and what it promises fits no other run."""
         trial = self._joined(fit, start.cause, FEW, known)
         left = unexplained(fit.chi2, self.expected)
         promised = min(start.promise, left)
         if trial is None or not np.isfinite(start.promise):
             return trial
-        hopes = PROMISES if trial.fit.chi2 < fit.chi2 else ASTRAY
-        for again in (self._joined, self._followed):
+        rich = self.reach.rich
+        hopes = ASTRAY if rich and trial.fit.chi2 >= fit.chi2 else PROMISES
+        for again in (self._joined, self._followed) if rich else (self._joined,):
             if promised <= hopes * left or fit.chi2 - trial.fit.chi2 > KEEPS * promised:
                 break
             other = again(fit, start.cause, FEW, None)
@@ -378,7 +380,7 @@ class Sieve:
         again = self._solved(best.structure, start, FEW, known)
         if again is None:
             return []
-        return [self._falling(again) if self._strayed(fit) else again]
+        return [self._falling(again) if self.reach.rich and self._strayed(fit) else again]
 
     def _strayed(self, fit: Fit) -> bool:
         """Whether a mode of a fit's pad is another one by far than any that was believed: then the way back is long."""
