@@ -372,7 +372,8 @@ class Sieve:
         return pad, jacobian(self.short, fit.structure, x)[:, : len(x) - fit.structure.tail]
 
     def _from_believed(self, fit: Fit, tried: Sequence[Trial], pad: Array, known: Array) -> list[Trial]:
-        """The best of some starts again, with the pad as it was believed: a refit may have run far from it."""
+        """The best of some starts again, with the pad as it was believed: a refit may have run far from it. Where a
+        mode has, the way back is long, and is gone where depths are met more than once (`_kept`)."""
         if not tried:
             return []
         best = min(tried, key=lambda t: t.score).fit
@@ -383,7 +384,7 @@ class Sieve:
         return [self._falling(again) if self.reach.rich and self._strayed(fit) else again]
 
     def _strayed(self, fit: Fit) -> bool:
-        """Whether a mode of a fit's pad is another one by far than any that was believed: then the way back is long."""
+        """Whether a mode of a fit's pad is another one by far than any that was believed."""
         order, end = self.believed.pad.pad.relaxation.order, len(fit.structure.pad.coordinates)
         rates, believed = fit.x[end - order : end], self.believed.pad.x()[len(self.believed.pad.coordinates) - order :]
         off = np.abs(rates[:, None] - believed[None, :]).min(axis=1, initial=np.inf)

@@ -264,11 +264,11 @@ def _at_the_most(search: Search, final: Fit, index: int, gain: float, named: int
 
 def _of_the_size(final: Fit, index: int) -> str:
     """What is wrong with the size of a fit's cause where its name cannot be sure."""
-    size, numbers = final.structure.causes[index].amplitude, described(final, index)[2]
+    size = final.structure.causes[index].amplitude
     if size is None:
         return ""
     at = 1e-6 * (size.upper - size.lower)
-    inside = size.lower + at < numbers[size.name].value < size.upper - at
+    inside = size.lower + at < final.structure.values(final.x)[index][size.name] < size.upper - at
     return f"these data hardly tell its {size.name}" if inside else f"its {size.name} is as far as it is sought here"
 
 
