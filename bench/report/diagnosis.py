@@ -113,7 +113,7 @@ def _causes(d: Diagnosis) -> str:
                 _numbers(cause),
                 words.percent(cause.gain),
                 words.sure(cause).removesuffix(" sure"),
-                "\n".join(filter(None, (words.rivals(cause) or "nothing near", words.no_surer(cause)))),
+                "; ".join(filter(None, (words.rivals(cause) or "nothing near", words.no_surer(cause)))),
             )
         )
     said = "<p>Shares are of the error beyond the noise, on data held out, in the order listed.</p>"

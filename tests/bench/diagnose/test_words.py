@@ -76,7 +76,7 @@ def test_a_name_that_something_else_than_its_rivals_keeps_doubtful_says_what():
     why = "its gap is as far as it is sought here"
     doubted = made_up(causes=[replace(d.causes[0], confidence=0.125, doubt=why)])
     assert f"no surer, for {why}" in "\n".join(lines(doubted))
-    assert f"no surer, for {why}" in diagnosis_page(doubted)
+    assert f"cannot exclude: backlash (97 % of the gain); no surer, for {why}" in diagnosis_page(doubted)
     assert doubted.to_json()["causes"][0]["doubt"] == why
 
 
