@@ -122,6 +122,23 @@ def test_first_steps_that_lead_to_more_than_there_was_are_taken_anew():
     assert kept.fit.chi2 < fit.chi2 < led.fit.chi2
 
 
+@pytest.mark.parametrize("rich", [True, False])
+def test_no_start_goes_the_long_way_where_depths_are_met_once(rich, monkeypatch):
+    """There it leads to any shape: measured relaxations got causes by it that foretold no other run."""
+    search, fit = gone_far()
+    search.reach = replace(search.reach, rich=rich)
+    signatures, softening = Signatures(search.short, fit), effect("stress_softening")
+    start = starts(signatures, softening, narrowed(softening.form("rejoining"), search.reach))[0]
+    start = replace(start, promise=fit.chi2)
+    gone: set[str] = set()
+    followed, falling = search._followed, search._falling
+    monkeypatch.setattr(search, "_followed", lambda *a: gone.add("followed") or followed(*a))
+    monkeypatch.setattr(search, "_falling", lambda *a: gone.add("falling") or falling(*a))
+    kept = search._kept(fit, start, signatures.jacobian)
+    search._from_believed(fit, [kept], *search._as_believed(fit))
+    assert gone == ({"followed", "falling"} if rich else set())
+
+
 @pytest.mark.parametrize(("travel_mm", "sought"), [(3.0, True), (3e-3, False)])
 def test_what_repeats_is_sought_where_the_way_holds_a_wave(travel_mm, sought):
     """A cell is pressed by micrometres: no thread and no scale has so short a pitch, and any curve is a part of one."""
