@@ -27,6 +27,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import threading
 import time
 import types
 from collections.abc import Callable, Iterable, Iterator, MutableSequence
@@ -47,6 +48,8 @@ KEEP_UNUSED_S = 30 * 86400.0
 
 
 SIM = Path(__file__).resolve().parent
+
+_CACHE_LOCK = threading.Lock()
 
 
 def sources_hash(files: Iterable[Path]) -> str:
@@ -129,16 +132,18 @@ def _folder_for(beside: Path) -> Path:
 
 @contextmanager
 def _numba_cache(function: Callable[..., Any]) -> Iterator[Any]:
-    """Numba, with its cache in our folder while it looks (other users of numba in this process keep theirs)."""
+    """Numba, with its cache in our folder while it looks (other users of numba in this process keep theirs). One thread
+    at a time: another that put the setting back amid a look would leave the cache in the working directory."""
     import numba
 
     config: Any = numba.config
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(_folder_for(Path(function.__code__.co_filename).parent))
-    try:
-        yield numba
-    finally:
-        config.CACHE_DIR = before
+    with _CACHE_LOCK:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(_folder_for(Path(function.__code__.co_filename).parent))
+        try:
+            yield numba
+        finally:
+            config.CACHE_DIR = before
 
 
 def _names(code: types.CodeType) -> set[str]:

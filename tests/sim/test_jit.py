@@ -3,6 +3,7 @@ import pickle
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,27 @@ def test_an_edit_beside_a_function_outside_of_sim_is_noticed_too(tmp_path: Path)
     assert run(code, tmp_path, tmp_path / "cache") == "3.0"
     (tmp_path / "one.py").write_text((tmp_path / "one.py").read_text().replace("2.0", "5.0"))
     assert run(code, tmp_path, tmp_path / "cache") == "6.0"
+
+
+def test_threads_that_compile_at_once_keep_to_the_cache_folder() -> None:
+    """Searches compile in threads. One that left while another looked put numba's setting back under it, and compiled
+    code came to lie in the working directory."""
+    entered, left = threading.Event(), threading.Event()
+    seen: list[str] = []
+
+    def second() -> None:
+        with jit._numba_cache(coulomb.python) as numba:
+            entered.set()
+            assert left.wait(10.0)
+            seen.append(numba.config.CACHE_DIR)
+
+    with jit._numba_cache(coulomb.python):
+        thread = threading.Thread(target=second)
+        thread.start()
+        entered.wait(0.3)
+    left.set()
+    thread.join(10.0)
+    assert seen == [str(jit.cache_folder())]
 
 
 def test_compiled_code_is_read_back_by_the_next_process(tmp_path: Path) -> None:
