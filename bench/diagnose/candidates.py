@@ -328,10 +328,16 @@ def _scanned(form: Form, near: Mapping[str, float]) -> Iterator[dict[str, float]
 
 
 def starts(
-    signatures: Signatures, effect: Effect, form: Form, most: int = 2, near: Mapping[str, float] | None = None
+    signatures: Signatures,
+    effect: Effect,
+    form: Form,
+    most: int = 2,
+    near: Mapping[str, float] | None = None,
+    rich: bool = True,
 ) -> list[Start]:
     """The most promising starts of a form, best first. `near`: numbers of another form of the family that was found,
-    about which frequencies are sought."""
+    about which frequencies are sought. `rich`: whether depths are met more than once; where not, none begins far off:
+    any shape fits there that is sought well enough, and foretells no other run."""
     cause = cause_of(effect, form)
     if cause.of_the_law:
         amended = _amended(signatures.fit, cause)
@@ -349,7 +355,7 @@ def starts(
     found: list[Start] = []
     if len(list(combinations(form))) > MANY and form.name != effect.forms[0].name:
         return []  # it is tried from where the family's first form has ended
-    for values in combinations(_finely(form)):
+    for values in combinations(_finely(form) if rich else form):
         trial = cause.with_start(**values)
         promise, best = signatures.of(trial)
         least = 0.05 * abs(amplitude.typical)
@@ -357,9 +363,9 @@ def starts(
         size = min(max(abs(best), least), 5 * abs(amplitude.typical) or abs(best))
         found.append(Start(trial.with_start(**{amplitude.name: _inside(sign * size, amplitude.lower, amplitude.upper)}),
                            promise))  # fmt: skip
-    found += [] if form.time_shift is None else _far_off(signatures, cause)
+    found += _far_off(signatures, cause) if rich and form.time_shift is not None else []
     found.sort(key=lambda s: -s.promise)
-    if any(p.bend for p in form.parameters):  # of many that promise as much, the one that keeps it comes first
+    if rich and any(p.bend for p in form.parameters):  # of many that promise as much, the one that keeps it comes first
         first = max(found[:KEPT], key=lambda s: signatures.whole(s.cause))
         found.sort(key=lambda s: s is not first)
     return found[:most]

@@ -56,7 +56,8 @@ class Shaping(Sieve):
                     continue
                 like = alike(now, index, cause_of(effect, form))
                 begun += [(here, c) for c in (like, *begun_anew(self.short, now, index, like))]
-                begun += [(without, s.cause) for s in starts(signatures, effect, form, near=numbers)]
+                anew = starts(signatures, effect, form, near=numbers, rich=self.reach.rich)
+                begun += [(without, s.cause) for s in anew]
         with ThreadPoolExecutor(WORKERS) as pool:
             first = [
                 t for t in pool.map(lambda start: self._joined(start[0], start[1], FEW, None), begun) if t is not None

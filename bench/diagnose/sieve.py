@@ -99,7 +99,8 @@ class Sieve:
             family.setdefault(effect.id, []).append(form)
 
         def begun(id_: str) -> list[Start]:
-            return [start for form in family[id_] for start in starts(signatures, effects.effect(id_), form)]
+            effect, rich = effects.effect(id_), self.reach.rich
+            return [start for form in family[id_] for start in starts(signatures, effect, form, rich=rich)]
 
         with ThreadPoolExecutor(WORKERS) as pool:
             # a thread has all forms of an id, which may share what they begin with; those that take longest come first

@@ -20,7 +20,7 @@ from sim.elastic import Polynomial
 from sim.model import Model
 from sim.pad import Cascade, Pad
 from sim.relaxation import Relaxation
-from tests.bench.diagnose.small import begun, measurement
+from tests.bench.diagnose.small import begun, case, measurement
 from tests.campaign.plan import Item
 from tests.truth.cases import draw_case
 
@@ -49,11 +49,27 @@ def test_a_clock_that_is_off_by_more_than_a_ramp_takes_is_sought_there():
     more, and what a small skew does to the force tells nothing of that."""
     c = Item("pair", ("clock_skew", "permanent_set"), ("random_walk", "core_crushes"), (1.41, 0.537), 527769910).case()
     search, base = begun(c)
-    clock = effect("clock_skew")
-    first = starts(Signatures(search.short, base), clock, narrowed(clock.forms[0], search.reach))[0]
-    true_ppm = c.truth.parameters["clock_skew"]["skew"]
+    signatures, clock = Signatures(search.short, base), effect("clock_skew")
+    form, true_ppm = narrowed(clock.forms[0], search.reach), c.truth.parameters["clock_skew"]["skew"]
+    first = starts(signatures, clock, form)[0]
     assert 0.3 < first.cause.start["skew"] / true_ppm < 3.0
     assert first.promise > 0.1 * (base.chi2 - search.expected)
+    assert starts(signatures, clock, form, rich=False)[0].promise < 0.1 * first.promise, "where depths are met once"
+
+
+def test_a_bend_is_sought_at_few_depths_where_they_are_met_once(monkeypatch):
+    """In between any depth can be made to fit there: a measured relaxation got a drift by it as large as its force."""
+    search, base = begun(case("backlash"))
+    signatures, play = Signatures(search.short, base), effect("backlash")
+    form = narrowed(play.form("lifted"), search.reach)
+    bend = next(p for p in form.parameters if p.bend)
+    tried: list[float] = []
+    monkeypatch.setattr(signatures, "of", lambda cause: tried.append(cause.start[bend.name]) or (1.0, 1.0))
+    starts(signatures, play, form, rich=False)
+    few = set(tried)
+    tried.clear()
+    starts(signatures, play, form)
+    assert few == set(bend.starts) and few < set(tried) and len(set(tried)) > 3 * len(few)
 
 
 @pytest.mark.long
