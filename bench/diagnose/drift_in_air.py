@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from sim.effects import Effect
 
-from .candidates import Reach, Signatures, Start, narrowed
 from .numbers import cause_of
+from .reach import Reach, narrowed
+from .starts import Signatures, Start
 
 Array = NDArray[np.float64]
 

@@ -12,15 +12,6 @@ from numpy.typing import NDArray
 
 from sim import effects
 
-from .candidates import (
-    LONGEST_PERIOD,
-    LONGEST_REPORTED,
-    Signatures,
-    combinations,
-    narrowed,
-    starts,
-    with_periods,
-)
 from .data import FeltErrors
 from .evidence import RIVAL, Evidence, believable, evidence_of, least_gain, of_slow_force, too_small, unexplained
 from .exchange import Exchange
@@ -29,10 +20,12 @@ from .late import LATE
 from .late_by_chance import late_by_chance_s
 from .numbers import shapes_of
 from .path import Path, Trial
+from .reach import LONGEST_PERIOD, LONGEST_REPORTED, narrowed, with_periods
 from .refit import Fit, mean_square, reduced, refit
 from .ripple import ripples, turned
 from .shapes import families
 from .sieve import ALL, MORE
+from .starts import Signatures, combinations, starts
 
 Array = NDArray[np.float64]
 

@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 
 from sim.effects import Form
 
-from .candidates import CHANNEL, LONGEST_PERIOD, Reach, Signatures, combinations, narrowed, starts, with_periods
+from .candidates import CHANNEL
 from .data import Data
 from .modes import NAMED as MISSING
 from .modes import as_believed, missing_told
 from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
+from .reach import LONGEST_PERIOD, Reach, narrowed, with_periods
 from .refit import Fit, chi2, reduced, refit
 from .ripple import larger_first, merged, ripples
+from .starts import Signatures, combinations, starts
 from .way import met_again
 
 Array = NDArray[np.float64]

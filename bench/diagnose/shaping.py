@@ -9,15 +9,17 @@ from functools import cached_property
 
 import numpy as np
 
-from .candidates import CHANNEL, Signatures, alike, forms, narrowed, starts, with_periods
+from .candidates import CHANNEL, forms
 from .data import Prepared
 from .evidence import RIVAL, believable, unexplained
 from .numbers import Cause, cause_of
 from .path import Trial
+from .reach import narrowed, with_periods
 from .refit import Fit, last, reduced, refit
 from .ripple import ripples
 from .shapes import begun_anew, departed, waving
 from .sieve import ALL, CLOSE, FEW, LATER, MORE, WORKERS, Sieve, drawn, plainer_first
+from .starts import Signatures, alike, starts
 
 MUCH, MOST = 0.25, 0.5  # of its gain, and of what is left, that a further cause takes beside a second one of a kind
 AS_WELL = 0.8  # share of a second cause of a kind's gain, that a further cause's beside the first reaches

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sim import effects
 from sim.effects import Effect, Form
 
-from .candidates import Reach, Signatures, Start, forms, starts
+from .candidates import forms
 from .dashpot import instead_of_a_mode
 from .data import Data, Prepared
 from .drift_in_air import told_in_air
@@ -24,9 +24,11 @@ from .modes import missing_told
 from .noise import HARDLY_ANY
 from .numbers import Cause, Structure, cause_of
 from .path import Trial
+from .reach import Reach
 from .refit import Fit, extended, force_at, jacobian, refit
 from .ripple import merged, ripples, two_periods
 from .spectrum import one_more_mode
+from .starts import Signatures, Start, starts
 from .way import met_again
 
 Array = NDArray[np.float64]

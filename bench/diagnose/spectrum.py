@@ -17,10 +17,10 @@ from scipy.optimize import lsq_linear
 
 from sim.relaxation import Relaxation
 
-from .candidates import Signatures
 from .modes import NAMED, left_over
 from .numbers import Cause
 from .refit import force_at
+from .starts import Signatures
 
 Array = NDArray[np.float64]
 

@@ -9,12 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.diagnose import diagnose
-from bench.diagnose.candidates import Reach, Signatures
 from bench.diagnose.channel import faults
 from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.drift_in_air import told_in_air
+from bench.diagnose.reach import Reach
 from bench.diagnose.refit import refit
+from bench.diagnose.starts import Signatures
 from bench.recording.types import Measurement
 from sim import effects
 from sim.model import Model

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bench.diagnose import diagnose, ripple
-from bench.diagnose.candidates import Reach, narrowed
 from bench.diagnose.numbers import cause_of
 from bench.diagnose.path import Trial
+from bench.diagnose.reach import Reach, narrowed
 from bench.diagnose.refit import Fit
 from bench.diagnose.sieve import plainer_first
 from sim.effects import effect

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.diagnose import candidates, diagnose, shapes, spread
+from bench.diagnose import diagnose, reach, shapes, spread, starts
 from bench.diagnose.modes import as_believed
 from bench.diagnose.numbers import Coordinate, cause_of
 from bench.diagnose.path import Measure
@@ -93,7 +93,7 @@ def test_a_period_longer_than_any_that_was_sought_is_found(seed: int, monkeypatc
     """Long periods are not sought while another law may stand first; a shorter one leaves something."""
     c, p, right = fitted("encoder_error", "harmonic", "harmonics", 2.5, seed, protocol="random_steps")
     true = c.truth.parameters["encoder_error"]["period"]
-    monkeypatch.setattr(candidates, "LONGEST_REPORTED", 0.7 * true / right.structure.pad.depth_mm)
+    monkeypatch.setattr(reach, "LONGEST_REPORTED", 0.7 * true / right.structure.pad.depth_mm)
     own, values = right.structure.causes[0], right.structure.values(right.x)[0]
     short = tuple(
         replace(q, upper=0.7 * true, starts=(), default=0.6 * true, typical=0.6 * true) if q.name == "period" else q
@@ -249,10 +249,8 @@ def test_the_numbers_of_another_shape_begin_where_they_fit_best(seed: int) -> No
     """A screw worn where it is used most: the place of that is told by no number of a play."""
     c, prepared, fit = fitted("backlash", "worn", "play", 1.5, seed, noise_kind="white")
     play = fit.structure.causes[0]
-    form = candidates.narrowed(
-        play.effect.form("running_out"), candidates.Reach.of(prepared.short, fit.structure, 0.01)
-    )
-    like = candidates.alike(fit, 0, cause_of(play.effect, form))
+    form = reach.narrowed(play.effect.form("running_out"), reach.Reach.of(prepared.short, fit.structure, 0.01))
+    like = starts.alike(fit, 0, cause_of(play.effect, form))
     begun = shapes.begun_anew(prepared.short, fit, 0, like)
     assert {c.start["gap"] for c in begun} == {like.start["gap"]}
 

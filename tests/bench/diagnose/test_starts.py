@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from bench.diagnose import diagnose, sieve
-from bench.diagnose.candidates import Reach, Signatures, _scanned, alike, forms, narrowed, starts
 from bench.diagnose.late import LATE, as_late, lateness_s
 from bench.diagnose.numbers import PadNumbers, Structure, cause_of
+from bench.diagnose.reach import Reach, narrowed
 from bench.diagnose.refit import Fit, refit
-from bench.diagnose.ripple import ripples
 from bench.diagnose.search import Search
+from bench.diagnose.starts import Signatures, _scanned, alike, starts
 from sim.effects import effect
 from sim.effects.base import Active
 from sim.elastic import Polynomial
@@ -155,19 +155,6 @@ def test_no_start_goes_the_long_way_where_depths_are_met_once(rich, monkeypatch)
     assert gone == ({"followed", "falling"} if rich else set())
 
 
-@pytest.mark.parametrize(("travel_mm", "sought"), [(3.0, True), (3e-3, False)])
-def test_what_repeats_is_sought_where_the_way_holds_a_wave(travel_mm, sought):
-    """A cell is pressed by micrometres: no thread and no scale has so short a pitch, and any curve is a part of one."""
-    reach = Reach(1e-3, 10.0, travel_mm=travel_mm, depth_mm=0.8 * travel_mm, force_N=1e-6, changes_N=1e-5)
-    pad = Pad(Polynomial((0.0, 1e-3 / travel_mm)), Relaxation(), unilateral=True)
-    structure = Structure(PadNumbers(pad, 0.8 * travel_mm, 1e-6), ())
-    found = [form for _, form in forms(structure, False, reach) if ripples(form)]
-    assert bool(found) == sought
-    for form in found:
-        (period,) = (p for p in form.parameters if p.name == "period")
-        assert period.upper <= 1.6 * travel_mm
-
-
 @pytest.mark.parametrize("id_", LATE)
 def test_delay_lag_and_resonance_are_as_late_as_they_say(id_):
     """Behind a long ramp of 1 N/s the force comes late by so many newtons as seconds."""
@@ -204,31 +191,3 @@ def test_another_shape_has_the_numbers_that_it_shares_with_the_one_found():
     fit = Fit(structure, x, 0.0, np.eye(len(x)), True)
     slotted = alike(fit, 0, cause_of(cogging, cogging.form("slotted")))
     assert slotted.start == pytest.approx({"amplitude": 0.2, "period": 1.3, "phase": 0.4, "steepness": 2.0})
-
-
-@pytest.mark.parametrize("force_N", [0.5, 50.0])
-def test_a_joint_opens_or_closes_within_the_forces_that_were_met(force_N):
-    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=3.0, depth_mm=2.5, force_N=force_N, changes_N=60.0)
-    for form in ("joint", "closing"):
-        preload = next(
-            p for p in narrowed(effect("frame_compliance").form(form), reach).parameters if p.name == "preload"
-        )
-        assert 0 < preload.lower < min(preload.starts) < max(preload.starts) < preload.upper <= force_N
-
-
-@pytest.mark.parametrize("travel_mm", [0.3, 3.0])
-def test_a_pull_reaches_no_further_than_the_way_on_which_it_is_seen(travel_mm):
-    reach = Reach(
-        sample_s=0.01, span_s=60.0, travel_mm=travel_mm, depth_mm=0.8 * travel_mm, force_N=5.0, changes_N=60.0
-    )
-    for form in effect("adhesion").forms:
-        pull = next(p for p in narrowed(form, reach).parameters if p.name == "range")
-        assert max(pull.starts) <= pull.upper <= travel_mm
-
-
-def test_what_was_pressed_before_as_deep_as_the_run_goes_does_not_soften_in_it():
-    """It is a law then, of which these data see no other branch."""
-    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=2.0, depth_mm=1.5, force_N=5.0, changes_N=60.0)
-    form = narrowed(effect("stress_softening").form("preconditioned"), reach)
-    already = next(p for p in form.parameters if p.name == "already")
-    assert already.upper < 1.5 and already.starts and max(already.starts) <= already.upper
