@@ -27,7 +27,10 @@ BEFORE, AFTER = "simulated", "commanded"
 
 
 def _scaled(peak_N: float) -> tuple[float, str]:
-    return (1e3, "mN") if peak_N < 0.5 else (1.0, "N")
+    for scale, unit in ((1.0, "N"), (1e3, "mN"), (1e6, "µN")):
+        if scale * peak_N >= 0.5:
+            return scale, unit
+    return 1e9, "nN"
 
 
 def _band(ax: Axes, floor_N: float, scale: float, label: str) -> None:
@@ -53,8 +56,6 @@ def residuals(d: Diagnosis) -> str:
     before, after = d.force_N - d.before_N, d.force_N - d.after_N
     shown = d.counted if d.counted.any() else np.ones(len(d.time_s), dtype=bool)
     bad = flagged(d)
-    peak = float(np.nanmax(np.abs(before[shown & ~bad]), initial=0.0)) or 1.0
-    scale, unit = _scaled(peak)
 
     def draw(figure: Figure) -> None:
         made = parts.panels(figure, heights)
@@ -64,6 +65,7 @@ def residuals(d: Diagnosis) -> str:
             shows.append((after, AFTER, "after: with the causes named"))
         for ax, (left, colour, label) in zip(made, shows, strict=True):
             top = 1.12 * max(float(np.nanmax(np.abs(left[shown & ~bad]), initial=0.0)), 2.4 * d.noise_floor)
+            scale, unit = _scaled(top)
             history = ~(shown | bad)
             if history.any():
                 parts.line(ax, d.time_s, np.where(history, left, np.nan) * scale, "muted", "", width=0.7)

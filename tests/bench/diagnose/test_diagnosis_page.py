@@ -10,7 +10,7 @@ import pytest
 
 from bench.diagnose.result import Remainder
 from bench.report.diagnosis import card, diagnosis_page, write_diagnosis
-from bench.report.diagnosis_plots import view
+from bench.report.diagnosis_plots import residuals, view
 from bench.report.diagnosis_views import Series, View, best_view
 from tests.bench.diagnose.small import made_up
 from tests.bench.report.html_check import check
@@ -121,3 +121,11 @@ def test_where_no_cause_is_named_nothing_is_shown_twice():
 def test_the_chance_of_a_finding_is_never_said_to_be_none(p_value, said):
     told = Remainder("speed", p_value, 0.03, "goes with the speed", True)
     assert f'<td class="n">{said.replace("<", "&lt;")}</td>' in diagnosis_page(made_up(remainders=[told]))
+
+
+def test_what_is_left_is_drawn_in_a_unit_of_its_own():
+    """Newtons before and micronewtons after: one unit for both wrote 1e-5 over the legend."""
+    told = made_up()
+    left_N = 1e-5 * np.sign(told.force_N - told.after_N)
+    plot = residuals(replace(told, before_N=told.before_N - 5.0, after_N=told.force_N - left_N, noise_floor=2e-5))
+    assert ">residual, N<" in plot and ">residual, µN<" in plot
