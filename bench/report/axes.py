@@ -55,6 +55,24 @@ def stacked(heights: Sequence[float], top: float = 30.0) -> float:
     return top + sum(heights) + _GAP * (len(heights) - 1) + 42.0
 
 
+def force_unit(peak_N: float) -> tuple[float, str]:
+    """(units a newton, unit) in which an axis up to `peak_N` has short numbers; newtons where that is none."""
+    if not peak_N > 0.0:
+        return 1.0, "N"
+    for scale, unit in ((1.0, "N"), (1e3, "mN"), (1e6, "µN")):
+        if scale * peak_N >= 0.5:
+            return scale, unit
+    return 1e9, "nN"
+
+
+def noise_band(ax: Axes, floor_N: float, scale: float) -> None:
+    """Two deviations of the noise either way; `scale`: units of the axis a newton."""
+    edge = 2.0 * floor_N * scale
+    ax.axhspan(-edge, edge, color=light("noise"), alpha=0.22, lw=0, zorder=0.5, label="noise floor ± 2σ")
+    for y in (-edge, edge):  # in front, where dense data would hide the band
+        ax.axhline(y, color=light("noise"), lw=0.9, ls="--", zorder=3)
+
+
 def line(
     ax: Axes,
     time_s: Array,

@@ -26,20 +26,6 @@ BEFORE, AFTER = "simulated", "commanded"
 """Colours of what is from before and after."""
 
 
-def _scaled(peak_N: float) -> tuple[float, str]:
-    for scale, unit in ((1.0, "N"), (1e3, "mN"), (1e6, "µN")):
-        if scale * peak_N >= 0.5:
-            return scale, unit
-    return 1e9, "nN"
-
-
-def _band(ax: Axes, floor_N: float, scale: float, label: str) -> None:
-    edge = 2.0 * floor_N * scale
-    ax.axhspan(-edge, edge, color=light("noise"), alpha=0.22, lw=0, zorder=0.5, label=label)
-    for y in (-edge, edge):  # in front, where dense data would hide the band
-        ax.axhline(y, color=light("noise"), lw=0.9, ls="--", zorder=3)
-
-
 def flagged(d: Diagnosis) -> NDArray[np.bool_]:
     """Samples (n,) that have a channel fault, where they can be laid beside the residual."""
     out = np.zeros(len(d.time_s), dtype=bool)
@@ -65,12 +51,12 @@ def residuals(d: Diagnosis) -> str:
             shows.append((after, AFTER, "after: with the causes named"))
         for ax, (left, colour, label) in zip(made, shows, strict=True):
             top = 1.12 * max(float(np.nanmax(np.abs(left[shown & ~bad]), initial=0.0)), 2.4 * d.noise_floor)
-            scale, unit = _scaled(top)
+            scale, unit = parts.force_unit(top)
             history = ~(shown | bad)
             if history.any():
                 parts.line(ax, d.time_s, np.where(history, left, np.nan) * scale, "muted", "", width=0.7)
             parts.line(ax, d.time_s, np.where(shown & ~bad, left, np.nan) * scale, colour, label, width=0.8)
-            _band(ax, d.noise_floor, scale, "noise floor ± 2σ")
+            parts.noise_band(ax, d.noise_floor, scale)
             _marks(ax, d.time_s, left * scale, bad, top * scale)
             ax.axhline(0.0, color=light("muted"), lw=0.7)
             ax.set_ylim(-top * scale, top * scale)
@@ -95,7 +81,7 @@ def view(chosen: View, *, named: bool = True) -> str:
     """Mean residual before and after, group by group, against what shows the cause best; `named`: a cause is."""
     heights = [240.0]
     values = [np.abs(np.concatenate([s.before_N, s.after_N])) for s in chosen.series]
-    scale, unit = _scaled(max((float(np.nanmax(v, initial=0.0)) for v in values), default=1.0))
+    scale, unit = parts.force_unit(max((float(np.nanmax(v, initial=0.0)) for v in values), default=1.0))
     spectrum = chosen.name == "frequency"
     top = 30.0 if len(chosen.series) < 2 else 52.0  # room for a legend of two lines
 
@@ -163,7 +149,7 @@ def candidates(d: Diagnosis) -> str:
 
 def held_out(d: Diagnosis) -> str:
     """Held-out error, before and after where a cause is named, with the noise floor."""
-    scale, unit = _scaled(max(d.held_out_before, d.held_out_after))
+    scale, unit = parts.force_unit(max(d.held_out_before, d.held_out_after))
     rows = [("before", d.held_out_before, BEFORE), ("after", d.held_out_after, AFTER)]
     if not d.causes:
         rows = [("as believed", d.held_out_before, BEFORE)]

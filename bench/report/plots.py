@@ -81,16 +81,13 @@ def _residual(ax: Axes, fit: FitView) -> None:
     counted = left[fitted] if fitted.any() else left
     peak = float(np.nanmax(np.abs(counted))) if counted.size and np.isfinite(counted).any() else 1.0
     floor = fit.number("noise_floor")
-    scale, unit = (1e3, "mN") if peak < 0.5 else (1.0, "N")
+    scale, unit = parts.force_unit(peak)
     if not fitted.all():
         parts.line(ax, fit.time_s, np.where(fitted, np.nan, left) * scale, "muted", "history, not fitted", width=0.8)
     parts.line(ax, fit.time_s, np.where(fitted, left, np.nan) * scale, "residual", "", width=0.9)
     top = 1.12 * peak
     if math.isfinite(floor) and floor > 0:
-        band = 2 * floor * scale
-        ax.axhspan(-band, band, color=light("noise"), alpha=0.22, lw=0, zorder=0.5, label="noise floor ± 2σ")
-        for edge in (-band, band):  # in front, where dense data would hide the band
-            ax.axhline(edge, color=light("noise"), lw=0.9, ls="--", zorder=3)
+        parts.noise_band(ax, floor, scale)
         top = max(top, 2.6 * floor)
     ax.axhline(0.0, color=light("muted"), lw=0.7)
     if top > 0:
