@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -15,14 +16,18 @@ Array = NDArray[np.float64]
 SAME_INSTANT_S = 1e-9
 """Stamps closer than this are one instant: differences over less are rounding."""
 
-MODES_KEPT, SETS_KEPT = 16, 4
+MODES_KEPT, SETS_KEPT, WAYS_KEPT = 16, 4, 8
+
+Report = tuple[int, tuple[float, ...]]
+"""A block by which an encoder reports another position than the true one: its address, and its parameters."""
 
 
 class Grid:
     """Times (n,) that do not fall, and the steps between them.
 
-    A fit runs a plant many times over the same times, mostly with the same rates: what a mode keeps and gains in each
-    step is worked out once for those last asked for. Raises ValueError for times that are not finite or fall.
+    A fit runs a plant many times over the same times, mostly with the same rates and the same encoder: what a mode
+    keeps and gains in each step, and where the probe was, is worked out once for those last asked for. Raises
+    ValueError for times that are not finite or fall.
     """
 
     def __init__(self, time_s: ArrayLike) -> None:
@@ -31,6 +36,7 @@ class Grid:
         self.dt_s = steps(self.time_s)
         self._mode = lru_cache(MODES_KEPT)(self._worked_out)
         self._set = lru_cache(SETS_KEPT)(self._stacked)
+        self._ways: deque[tuple[tuple[Report, ...], Array, Array]] = deque(maxlen=WAYS_KEPT)
 
     def __reduce__(self) -> tuple[type[Grid], tuple[Array]]:
         return Grid, (self.time_s,)  # what is kept for speed stays behind
@@ -38,6 +44,18 @@ class Grid:
     def fades(self, rates_per_s: Sequence[float]) -> tuple[Array, Array]:
         """(decay, gain), (r, n) each, of relaxation modes in each step (`kernel.fade`)."""
         return self._set(tuple(rates_per_s))
+
+    def true_mm(self, reports: tuple[Report, ...], reported_mm: Array, work_out: Callable[[Array], Array]) -> Array:
+        """True positions (n,), not to be written, from reported ones: as last worked out, where that was for the same.
+
+        Most numbers of a fit leave the encoder as it is.
+        """
+        for known, before, true in tuple(self._ways):  # a copy, as other threads add to them
+            if known == reports and np.array_equal(before, reported_mm):
+                return true
+        true = work_out(reported_mm)
+        self._ways.append((reports, reported_mm.copy(), true))
+        return true
 
     def _worked_out(self, rate_per_s: float) -> tuple[Array, Array]:
         decay, gain = np.empty(self.dt_s.size), np.empty(self.dt_s.size)

@@ -331,16 +331,17 @@ def run_chain(program: Program, params: Array, state: Array, place: int, dt: Arr
 def unreport(program: Program, params: Array, state: Array, u: Array) -> None:
     """True positions from reported ones, in place, by bracketed secant steps; `report` blocks are static and rise.
 
-    Each begins with the error and the slope of the one before: positions stand still most of the time.
+    Each begins beside the one before, by the slope there: positions stand still most of the time.
     """
     program_p, params_p, state_p = pointer(program), pointer(params), pointer(state)
-    off, slope = 0.0, 1.0
+    y, reported, slope = 0.0, 0.0, 1.0
     for n in range(u.size):
-        y = u[n] + off
+        y += (u[n] - reported) / slope
+        reported = u[n]
         low, high = -math.inf, math.inf
         before, error_before = y, 0.0
         for k in range(60):
-            error = chain(program_p, params_p, state_p, 0, REPORT, 0.0, y) - u[n]
+            error = chain(program_p, params_p, state_p, 0, REPORT, 0.0, y) - reported
             if abs(error) <= 1e-15 * max(abs(y), 0.1):
                 break
             if error > 0.0:
@@ -358,7 +359,6 @@ def unreport(program: Program, params: Array, state: Array, u: Array) -> None:
                     y = 0.5 * (low + high)
                     if not low < y < high:  # nothing lies between
                         break
-        off = y - u[n]
         u[n] = y
 
 
