@@ -165,7 +165,7 @@ class Search(Exchange):
         if not self._much_left(path) or unexplained(end.chi2, self.expected) <= 0.0:
             return None
         for near in self._near(path.measures[0].before, path.rivals[0]):
-            if self.work - begun >= MOST_WORK:
+            if self.work - begun >= MOST_WORK * MORE_FOR_TWO:
                 break
             first = self._carried(near, ALL)
             if not self._two_leave_less(first, end):
