@@ -66,6 +66,7 @@ from sim.slots import (
 from sim.surface import free_surface, surface_force, torn
 
 _TOLERANCE = 4e-15
+_NEXT_IS_NONE = 1e-17  # mm², of the errors of two secant steps: the next is that times half the curvature
 
 
 @compiled("float64(float64)")
@@ -350,6 +351,7 @@ def unreport(program: Program, params: Array, state: Array, u: Array) -> None:
                 low = y
             if k > 0 and error != error_before:
                 slope = min(2.0, max(0.05, (error - error_before) / (y - before)))
+            last = k > 0 and abs(error * error_before) <= _NEXT_IS_NONE
             before, error_before = y, error
             y -= error / slope
             if not low < y < high:
@@ -359,6 +361,8 @@ def unreport(program: Program, params: Array, state: Array, u: Array) -> None:
                     y = 0.5 * (low + high)
                     if not low < y < high:  # nothing lies between
                         break
+            elif last:
+                break
         u[n] = y
 
 

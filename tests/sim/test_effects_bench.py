@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from sim.effects import effect
 from sim.elastic import Exponential
 from sim.pad import Cascade, Pad
 from sim.relaxation import Relaxation
@@ -263,6 +264,19 @@ class TestPeriodic:
                 wave = wave + 0.5 * np.sin(4 * np.pi * true / 0.8)
             assert_allclose(reported - true, 0.05 * wave, atol=1e-14)
             assert_allclose(cascade.simulate(true + 1, reported), K * np.maximum(true, 0.0), atol=1e-11)
+
+    def test_the_encoder_is_undone_to_rounding_in_every_shape(self) -> None:
+        """Steep errors, on a motion that rests, moves and jumps, with the noise of an encoder on it."""
+        rng = np.random.default_rng(7)
+        moves = np.interp(np.arange(900), [0, 200, 300, 500, 501, 899], [0.0, 0.0, 1.3, 1.3, 0.4, 2.0])
+        for form in effect("encoder_error").forms:
+            for noise_mm in (0.0, 1e-5, 1e-3):
+                numbers = {p.name: p.if_left_out for p in form.parameters} | {"amplitude": 0.02, "period": 0.11}
+                cascade = Cascade(AIR, [active("encoder_error", form.name, **numbers)])
+                reported = moves + noise_mm * rng.standard_normal(moves.size)
+                plant = cascade.plant()
+                again = [plant.reported_mm(float(x)) for x in cascade._true(reported)]
+                assert_allclose(again, reported, rtol=0.0, atol=2e-14, err_msg=f"{form.name} {noise_mm}")
 
     def test_an_error_too_steep_is_taken_as_the_steepest(self) -> None:
         plant = Cascade(AIR, [active("encoder_error", amplitude=1.0, period=0.5)]).plant()
