@@ -35,7 +35,7 @@ QUIET = 2.0  # times the noise's square: what is left altogether, where its colo
 MOST_WORK = 150_000_000  # simulated samples, after which no further cause is looked for
 MORE_FOR_TWO = 2.0  # times those, where the first of two leaves much
 A_SHAPE = 0.1  # of what is left beyond the noise, that another shape of a cause takes where no further cause pays
-HALF = 0.5  # of what a shape at a bound leaves beyond the noise: more is left by one that only evades the bound
+HALF = 0.5  # of what a shape at a bound, or two causes, leave beyond the noise: what goes in their place leaves less
 MUCH_LEFT, A_PART = 0.03, 0.05  # of what the belief leaves beyond the noise, that a first cause and all that follow it
 # leave; and what the lesser of two in its place takes, or of what was held out all that begins with another
 GOOD_PART, OTHERS = 0.4, 2  # of what a first cause takes, that others take; so many are tried where it was none
@@ -156,13 +156,15 @@ class Search(Exchange):
         return end - self.expected >= MUCH_LEFT * (base - self.expected)
 
     def _from_another_first(self, path: Path, begun: int) -> Path | None:
-        """The path to two causes from one that stood near the first, where the first leaves much and those two leave
-        nothing: of two that look like a third together, that one comes first. None: there is none."""
+        """The path to two causes from one that stood near the first, where the first leaves much, or what came in
+        behind it something, and those two leave nothing: of two that look like a third together, that one comes first,
+        and another fits what it has made of the rest. None: there is none."""
         if len(path.fits) < 2:
             return None
         end, prepared = path.fits[-1], self.prepared
-        left = end.chi2 - self.expected
-        if not self._much_left(path) or unexplained(end.chi2, self.expected) <= 0.0:
+        much = self._much_left(path) and unexplained(end.chi2, self.expected) > 0.0
+        something = len(path.fits) > 2 and end.chi2 - self.expected > np.sqrt(2.0 * self.expected)
+        if not much and not something:
             return None
         for near in self._near(path.measures[0].before, path.rivals[0]):
             if self.work - begun >= MOST_WORK * MORE_FOR_TWO:
@@ -173,11 +175,20 @@ class Search(Exchange):
             again = self._begun_with(path, first)
             again = self._walked(again, self.work)  # there is hope, and it has work of its own
             two = len(again.fits) == 3 and again.evidence[1].share > A_PART
-            beyond = again.fits[-1].chi2 - self.expected
-            if two and self._clean(again.fits[0].chi2, again.fits[-1].chi2) and beyond < LESS * left:
+            if self.prepared is not prepared:  # as the data have become on the way
+                end = refit(self.short, end.structure, end.x, 20, 1e-8)
+            if two and self._leaves_less(again, end, much):
                 return again
             self.prepared = prepared  # which the path that was left may have whitened
         return None
+
+    def _leaves_less(self, path: Path, end: Fit, much: bool) -> bool:
+        """Whether a path leaves nothing, and surely less than another one's end, which leaves much or not so."""
+        now = path.fits[-1]
+        if not self._clean(path.fits[0].chi2, now.chi2) or now.chi2 + self._penalty(now) >= self._to_beat(end):
+            return False
+        nothing = much or unexplained(now.chi2, self.expected) <= 0.0
+        return nothing and now.chi2 - self.expected < (LESS if much else HALF) * (end.chi2 - self.expected)
 
     def from_others(self, path: Path) -> Iterator[Path]:
         """Paths that begin with those that stood behind a path's first cause and take a good part of what it takes, all

@@ -368,6 +368,24 @@ def test_where_the_first_leaves_much_two_others_that_leave_nothing_stand_in_its_
     assert named(Told(ranks, None)) == after
 
 
+@pytest.mark.parametrize(
+    ("end", "two", "other"),
+    [
+        (1300.0, 1010.0, True),
+        (1300.0, 1160.0, False),  # more than half of what is left beyond the noise
+        (2500.0, 1200.0, False),  # those two leave something themselves
+        (1040.0, 960.0, False),  # that noise is by itself
+    ],
+)
+def test_where_what_came_in_behind_the_first_leaves_something_two_others_may_leave_nothing(end, two, other):
+    ranks: Any = {
+        (): {"friction": 50e3, "permanent_set": 700e3},
+        ("friction",): {"stress_softening": end},
+        ("permanent_set",): {"force_drift": two},
+    }
+    assert named(Told(ranks, None)) == (["permanent_set", "force_drift"] if other else ["friction", "stress_softening"])
+
+
 def test_a_second_that_takes_next_to_nothing_makes_no_other_first():
     ranks: Any = {
         (): {"stress_softening": 300e3, "permanent_set": 310e3},
