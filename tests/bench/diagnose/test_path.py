@@ -372,7 +372,7 @@ def test_where_the_first_leaves_much_two_others_that_leave_nothing_stand_in_its_
     ("end", "two", "other"),
     [
         (1300.0, 1010.0, True),
-        (1300.0, 1160.0, False),  # more than half of what is left beyond the noise
+        (1300.0, 1152.0, False),  # more than half of what is left beyond the noise
         (2500.0, 1200.0, False),  # those two leave something themselves
         (1040.0, 960.0, False),  # that noise is by itself
     ],
