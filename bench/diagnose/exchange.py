@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .evidence import RIVAL, believable, unexplained
+from .numbers import shapes_of
 from .path import Measure, Path, Trial
 from .refit import Fit, last, refit
 from .shaping import RIVALS, Shaping, no_rival
@@ -12,6 +13,7 @@ NEARLY = 0.95  # of what a cause takes: what another takes in its place that its
 MISSED, SHAPED = 0.75, 2  # of what a further cause takes, that it took in the shape in which it came in; and how many
 # rivals are asked for their shapes then
 NOTHING = 1.05  # times what noise leaves
+TRIED, TRIED_AGAIN = (5, 4), (8, 6)  # in a cause's place, of the first where it came in, and at the path's end
 MOST_NEAR = 8  # that stood close behind a cause with no more numbers, and are tried in its place
 
 
@@ -20,12 +22,24 @@ class Exchange(Shaping):
 
     def exchanged(self, path: Path) -> Fit:
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
-        out. Where nothing is left, those alone that stood near: what made them worse may have been the other cause."""
-        best, told = path.fits[-1], False
+        out. Where nothing is left, those alone that stood near: what made them worse may have been the other cause.
+        Once more, among more, where the same causes stay but in other shapes, and leave something: beside its wrong
+        shape a cause may have been in the way of what is missing."""
+        found = path.fits[-1]
+        best = self._exchanged(path, found, TRIED)
+        stayed = {c.id for c in best.structure.causes} == {c.id for c in found.structure.causes}
+        other = set(shapes_of(best.structure)) != set(shapes_of(found.structure))
+        if stayed and other and unexplained(best.chi2, self.expected) > 0.0:
+            best = self._exchanged(path, best, TRIED_AGAIN)
+        return best
+
+    def _exchanged(self, path: Path, fit: Fit, tried: tuple[int, int]) -> Fit:
+        """A fit of the causes at a path's end, or a better one with one of the earlier ones exchanged."""
+        best, told = fit, False
         own = len(self.believed.causes)
         for index in range(own, len(best.structure.causes)):
             present = {c.id for c in best.structure.causes}
-            rivals = [i for i in self._stood_beside(path, index - own) if i not in present]
+            rivals = [i for i in self._stood_beside(path, index - own, tried) if i not in present]
             if not rivals:
                 continue
             without = self._without(best, index)
@@ -36,15 +50,17 @@ class Exchange(Shaping):
                 best, told = self._better(best, other, without.chi2, room, told)
         return best
 
-    def _stood_beside(self, path: Path, stage: int) -> list[str]:
-        """Ids that are tried in the place of the cause that came in at a stage."""
+    def _stood_beside(self, path: Path, stage: int, tried: tuple[int, int]) -> list[str]:
+        """Ids that are tried in the place of the cause that came in at a stage: so many of the first there, and of
+        those at the path's end."""
         stage = min(stage, len(path.tried) - 1)
         stood = path.rivals[stage]
         near = self._near(path.measures[stage].before, stood, MOST_NEAR)
         if self._times_left(path) <= NOTHING:
             return [t.id for t in near[:RIVALS]]
         plain = [t.id for t in near if t.fit.free <= stood[0].fit.free]
-        return list(dict.fromkeys([*path.tried[stage][:5], *plain, *path.tried[-1][:4]]))
+        there, now = tried
+        return list(dict.fromkeys([*path.tried[stage][:there], *plain, *path.tried[-1][:now]]))
 
     def _better(self, fit: Fit, other: Trial, before: float, room: float, told: bool) -> tuple[Fit, bool]:
         """(A fit, or one with another cause in the place of one of its own where that is better; whether the fit's own

@@ -130,6 +130,36 @@ def test_a_cause_at_its_bound_gives_way_to_one_that_no_data_exclude(limit, besid
     assert after in {c.id for c in search.exchanged(path).structure.causes}
 
 
+class Reshaping(Exchanging):
+    """A search in which play turns out to be worn, beside which a cause that stood far behind leaves nothing."""
+
+    worn = 2800.0
+
+    def _without(self, now: Any, index: int) -> Any:
+        left = (c for k, c in enumerate(now.structure.causes) if k != index)
+        return fit(50e3, *(f"{c.id}/{c.form.name}" for c in left))
+
+    def recurved(self, now: Any) -> Any:
+        return fit(self.worn, "damage", "backlash/worn")
+
+    def ranked(self, now: Any, only: Any = None, least: float = 0.0) -> list[Any]:
+        worn = any(c.form.name == "worn" for c in now.structure.causes)
+        found = {"contact_offset": 1010.0, "cogging": 2900.0} if worn else {"cogging": 5000.0, "contact_offset": 30e3}
+        return [SimpleNamespace(id=i, fit=fit(x, "backlash", i), score=x) for i, x in found.items() if i in only]
+
+
+@pytest.mark.parametrize(
+    ("worn", "after"),
+    [(2800.0, "contact_offset"), (1060.0, "damage")],  # it leaves no more than noise may
+)
+def test_what_stood_far_behind_is_tried_once_those_beside_it_have_their_shapes(monkeypatch, worn, after):
+    """Seventh where damage came in, behind six that are tried at once or are worse beside any shape."""
+    monkeypatch.setattr(Reshaping, "worn", worn)
+    others = ["cogging", "permanent_set", "elastic_law", "frame_compliance", "friction"]
+    path = came("damage", 8500.0, damage=56e3, **dict.fromkeys(others, 150e3), contact_offset=160e3)
+    assert {c.id for c in Reshaping({}, None).exchanged(path).structure.causes} == {after, "backlash"}
+
+
 class Comparing(Exchanging):
     """A search whose comparison at the end is the real one."""
 
