@@ -19,7 +19,7 @@ from .modes import missing_told
 from .numbers import Structure, shapes_of
 from .path import Path
 from .refit import Fit, extended, force_at, mean_square, onto, placed, refit
-from .shapes import reshaped, steadier
+from .shapes import plainest, reshaped, steadier
 from .spread import covariance
 from .verdict import chain, excesses, no_size, ordered, sureness, told_size, without
 
@@ -248,7 +248,7 @@ def _whole(prepared: Prepared, fits: list[Fit], believed: Structure) -> tuple[Fi
         after = onto(last, full, 6, 1e-8)
     else:
         data = prepared.raw
-    after = _spread(prepared, data, gauged(data, after))
+    after = _spread(prepared, data, gauged(data, plainest(data, after, len(believed.causes))))
     if prepared.felt.total_N.any():
         before, after = placed(full, before), placed(data, after)
     return before, after

@@ -20,7 +20,7 @@ from .numbers import Cause, Structure, cause_of
 from .reach import LONGEST_PERIOD, Reach, narrowed, with_periods
 from .refit import Fit, chi2, reduced, refit
 from .ripple import larger_first, merged, ripples
-from .starts import Signatures, combinations, starts
+from .starts import Signatures, alike, combinations, starts
 from .way import met_again
 
 Array = NDArray[np.float64]
@@ -33,6 +33,7 @@ NEARLY = 1e-5  # of χ², that a step must promise
 END = 25  # steps of the one that is taken
 AS_GOOD = 4.0  # Δχ² by which one that is near to what was believed may be worse
 HARDLY_WORSE = 25.0  # Δχ² by which one wave that swells may be worse than two
+SAME = 1.0  # Δχ² by which a shape is no other
 LEFT = 1.03  # times the noise power: what leaves more may have a period beyond those sought
 IN_STEP = 0.3  # of the position's power, that is at a frequency: then the motion swings with it
 EDGE = 1e-6  # within which a coordinate is at its bound
@@ -155,6 +156,27 @@ def steadier(short: Data, fit: Fit, own: int = 0) -> Fit:
             if steady:
                 best = steady[int(np.argmin(scores(short, steady)))].fit
                 fit = refit(short, best.structure, best.x, END, 1e-8)
+    return fit
+
+
+def plainest(data: Data, fit: Fit, own: int = 0) -> Fit:
+    """The fit with those causes in a plainer shape whose further numbers have come to nothing: there it is the same.
+    `own`: causes at the begin that stay as they are."""
+    reach = Reach.of(data, fit.structure, data.sample_s)
+    for index in range(own, len(fit.structure.causes)):
+        pad = fit.x[: len(fit.structure.pad.coordinates)]
+        cause, values = fit.structure.causes[index], fit.structure.values(fit.x)[index]
+        left = {p.name for p in cause.fitted if p.required or values[p.name] != 0.0}
+        if len(left) == len(cause.fitted):
+            continue
+        for form in cause.effect.forms:
+            plain = alike(fit, index, cause_of(cause.effect, narrowed(form, reach)))
+            if not _comparable(cause.form, form) or not {p.name for p in plain.fitted} <= left:
+                continue
+            other = refit(data, *_in_place(fit, index, plain, pad), FEW, NEARLY)
+            if other.chi2 <= fit.chi2 + SAME:
+                fit = other
+                break
     return fit
 
 

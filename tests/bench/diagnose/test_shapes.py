@@ -11,8 +11,8 @@ from bench.diagnose import diagnose, reach, shapes, spread, starts
 from bench.diagnose.modes import as_believed
 from bench.diagnose.numbers import Coordinate, cause_of
 from bench.diagnose.path import Measure
-from bench.diagnose.refit import Fit, onto, refit
-from bench.diagnose.shapes import Member, departed, reshaped, steadier
+from bench.diagnose.refit import Fit, chi2, onto, refit
+from bench.diagnose.shapes import Member, departed, plainest, reshaped, steadier
 from bench.diagnose.spread import covariance, of_the_noise
 from bench.diagnose.verdict import found, told_size
 from sim.effects import effect
@@ -119,6 +119,21 @@ def test_a_period_as_long_as_any_that_repeats_stays(monkeypatch: pytest.MonkeyPa
 def test_the_best_shape_stays() -> None:
     _, p, fit = fitted("damage", "exponential", "exponential")
     assert reshaped(p.short, fit) is fit
+
+
+@pytest.mark.parametrize(("shape", "plain"), [("linear", "linear"), ("cold_flow", "flowing")])
+def test_a_shape_whose_further_number_is_nothing_is_the_plain_one(shape: str, plain: str) -> None:
+    """A set that goes on under load, or does not."""
+    _, p, fit = fitted("permanent_set", shape, "flowing")
+    at = fit.structure.of_cause(0)
+    if plain == "linear":  # as it ends on all of the data, where noise alone tells
+        x = fit.x.copy()
+        x[at.stop - 1] = 0.0
+        fit = replace(fit, x=x, chi2=chi2(p.full, fit.structure, x))
+    again = plainest(p.full, fit)
+    assert again.structure.causes[0].form.name == plain
+    assert again.chi2 <= fit.chi2 + 1.0
+    assert plainest(p.full, fit, own=1) is fit  # what is believed stays
 
 
 def test_a_number_at_the_end_of_what_is_told_costs_as_much_as_another_and_one_that_does_nothing_none() -> None:
