@@ -115,7 +115,10 @@ class Cascade:
         """As `simulate`, for times that are checked already: a fit runs over the same ones again and again."""
         if self.shifts_time:
             return self.simulate_at(grid.time_s, position_mm, grid.time_s)
-        force, _ = self._run(grid, self._true_on(grid, position_mm))
+        reported = of_one_length(grid.time_s, position_mm)
+        forms = [(a.form, a.values) for a in self.effects if "report" in a.form.blocks]
+        reports = tuple((form.blocks["report"].address, form.vector(values)) for form, values in forms)
+        force, _ = self._run(grid, grid.true_mm(reports, reported, self._true) if reports else reported)
         return self._sampled(grid.dt_s, force)
 
     def simulate_at(self, position_time_s: ArrayLike, position_mm: ArrayLike, force_time_s: ArrayLike) -> Array:
@@ -139,14 +142,7 @@ class Cascade:
     def probe(self, time_s: ArrayLike, position_mm: ArrayLike) -> tuple[Array, Array]:
         """(force at the cell, N; probe position, mm), both (n,), before the force path; else as `simulate`."""
         grid = Grid(time_s)
-        return self._run(grid, self._true_on(grid, position_mm), felt_by_cell=True)
-
-    def _true_on(self, grid: Grid, reported_mm: ArrayLike) -> Array:
-        """True positions from reported ones, one for each time of a grid; not to be written."""
-        reported = of_one_length(grid.time_s, reported_mm)
-        forms = [(a.form, a.values) for a in self.effects if "report" in a.form.blocks]
-        reports = tuple((form.blocks["report"].address, form.vector(values)) for form, values in forms)
-        return grid.true_mm(reports, reported, self._true) if reports else reported
+        return self._run(grid, self._true(of_one_length(grid.time_s, position_mm)), felt_by_cell=True)
 
     def _true(self, reported: Array) -> Array:
         """True positions from reported ones."""

@@ -175,9 +175,9 @@ class Search(Exchange):
             again = self._begun_with(path, first)
             again = self._walked(again, self.work)  # there is hope, and it has work of its own
             two = len(again.fits) == 3 and again.evidence[1].share > A_PART
-            if self.prepared is not prepared:  # as the data have become on the way
-                end = refit(self.short, end.structure, end.x, 20, 1e-8)
-            if two and self._leaves_less(again, end, much):
+            # on the data as they have become on the way
+            ended = end if self.prepared is prepared else refit(self.short, end.structure, end.x, 20, 1e-8)
+            if two and self._leaves_less(again, ended, much):
                 return again
             self.prepared = prepared  # which the path that was left may have whitened
         return None
