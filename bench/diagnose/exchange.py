@@ -14,6 +14,7 @@ MISSED, SHAPED = 0.75, 2  # of what a further cause takes, that it took in the s
 # rivals are asked for their shapes then
 NOTHING = 1.05  # times what noise leaves
 TRIED, TRIED_AGAIN = (5, 4), (8, 6)  # in a cause's place, of the first where it came in, and at the path's end
+MUCH = 2.0  # times what noise leaves: no shape that is known is right then
 MOST_NEAR = 8  # that stood close behind a cause with no more numbers, and are tried in its place
 
 
@@ -23,13 +24,14 @@ class Exchange(Shaping):
     def exchanged(self, path: Path) -> Fit:
         """The last fit, or a better one with one of its earlier causes exchanged for one that stood beside it, or left
         out. Where nothing is left, those alone that stood near: what made them worse may have been the other cause.
-        Once more, among more, where the same causes stay but in other shapes, and leave something: beside its wrong
-        shape a cause may have been in the way of what is missing."""
+        Once more, among more, where the same causes stay but in other shapes, and leave something that is no more than
+        the noise: beside its wrong shape a cause may have been in the way of what is missing."""
         found = path.fits[-1]
         best = self._exchanged(path, found, TRIED)
         stayed = {c.id for c in best.structure.causes} == {c.id for c in found.structure.causes}
         other = set(shapes_of(best.structure)) != set(shapes_of(found.structure))
-        if stayed and other and unexplained(best.chi2, self.expected) > 0.0:
+        something = unexplained(best.chi2, self.expected) > 0.0 and best.chi2 < MUCH * self.expected
+        if stayed and other and something:
             best = self._exchanged(path, best, TRIED_AGAIN)
         return best
 
