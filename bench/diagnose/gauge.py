@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 GAUGE = "weighs"  # the parameter by which the mean is stated: its product with the rate stays
 LITTLE = 1e-6  # 1/mm, of which what is left of the stiffness tells the travel that counts
+STEP = 1e-3  # of a coordinate of order one, for derivatives
 PRESSED = 0.3  # of the greatest depth: where that shows
 
 
@@ -39,6 +40,31 @@ def gauged(data: Data, fit: Fit) -> Fit:
         x[at] *= values[GAUGE] * counts / travel
         structure = structure.with_cause_at(index, cause.with_start(**{GAUGE: travel / counts}))
     return replace(fit, structure=structure, x=x)
+
+
+def in_the_mean(data: Data, fit: Fit, covariance: Array) -> Array:
+    """Covariance (P, P) of x with such rates as they are stated: as the other numbers of the law vary, a mm of loading
+    travel of the data takes another multiple of them."""
+    structure, x = fit.structure, fit.x
+    depth_mm = data.position_mm + structure.surface_mm(x)
+    stated = np.eye(len(x))
+    for index, values in enumerate(structure.values(x)):
+        cause = structure.causes[index]
+        if GAUGE not in values:
+            continue
+        at = structure.of_cause(index)
+        rate = at.start + [p.name for p in cause.fitted].index("rate")
+        for k in range(at.start, at.stop):
+            if k == rate or not structure.lower[k] + STEP < x[k] < structure.upper[k] - STEP:
+                continue
+            counts = []
+            for step in (-STEP, STEP):
+                beside = x.copy()
+                beside[k] += step
+                moved = structure.values(beside)[index]
+                counts.append(_counting_mm(data, depth_mm, cause.with_start(**moved)))
+            stated[rate, k] = x[rate] * (counts[1] - counts[0]) / (2.0 * STEP * max(sum(counts) / 2.0, 1e-300))
+    return np.asarray(stated @ covariance @ stated.T)
 
 
 def _counting_mm(data: Data, depth_mm: Array, cause: Cause) -> float:

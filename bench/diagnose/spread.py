@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bench.identify.uncertainty import sandwich
 
 from .data import Data
-from .gauge import gauged
+from .gauge import gauged, in_the_mean
 from .numbers import Coordinate
 from .refit import Fit, chi2, errors, jacobian, reduced, refit
 from .shapes import Member, families, scores, stand_in
@@ -31,7 +31,7 @@ def covariance(data: Data, short: Data, fit: Fit) -> Array:
     free of hum."""
     if not len(fit.x):
         return np.zeros((0, 0))
-    own = of_the_noise(data, fit)
+    own = in_the_mean(data, fit, of_the_noise(data, fit))
     for position in _flat(fit, np.diag(own)):
         own[position, position] = _by_steps(data, fit, position)
     return own + np.diag(_of_the_shapes(short, fit, np.diag(own).copy()))
@@ -117,8 +117,10 @@ def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
 def _stated(short: Data, member: Member) -> Member:
     """A shape with its numbers as they are stated, and their matrix."""
     stated = gauged(short, member.fit)
-    same = stated.structure is member.fit.structure
-    return member if same else replace(member, fit=refit(short, stated.structure, stated.x, 1, NEARLY))
+    if stated.structure is member.fit.structure:
+        return member
+    there = refit(short, stated.structure, stated.x, 1, NEARLY)
+    return replace(member, fit=replace(there, spread=in_the_mean(short, there, there.covariance())))
 
 
 @dataclass(frozen=True)
