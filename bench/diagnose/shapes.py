@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.effects import Form
+from sim.effects.base import Parameter
 
 from .candidates import CHANNEL
 from .data import Data
@@ -34,6 +35,11 @@ END = 25  # steps of the one that is taken
 AS_GOOD = 4.0  # Δχ² by which one that is near to what was believed may be worse
 HARDLY_WORSE = 25.0  # Δχ² by which one wave that swells may be worse than two
 SAME = 1.0  # Δχ² by which a shape is no other
+INEXACT = 0.02  # of what a cause takes, that its true shape may be from the nearest of its family
+LESS_ODD = (
+    0.7  # times as far from the other shapes, in squares, as the best: a shape whose numbers are taken for its own
+)
+FAR = 0.25  # of a number, that a shape which fits worse counts as away at the most: further, it means another thing
 LEFT = 1.03  # times the noise power: what leaves more may have a period beyond those sought
 IN_STEP = 0.3  # of the position's power, that is at a frequency: then the motion swings with it
 EDGE = 1e-6  # within which a coordinate is at its bound
@@ -123,7 +129,10 @@ def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
         members += [] if dealt is None else families(short, dealt, [index])[0]
         score = scores(short, members)
         score[count:] -= AS_GOOD
-        for best in np.argsort(score, kind="stable").tolist():
+        order = np.argsort(score, kind="stable").tolist()
+        if order[0] < count:
+            order.insert(0, _usual(short, members[:count], order[0]))
+        for best in order:
             if best == 0:
                 break
             other = refit(short, members[best].fit.structure, members[best].fit.x, END, 1e-8)
@@ -133,6 +142,41 @@ def reshaped(short: Data, fit: Fit, own: int = 0) -> Fit:
         taken = _longer(short, _apart(short, taken, index, members[1:count]), index)
         taken = _exchanged(short, taken, index)
     return fit if taken is lead else taken
+
+
+def weights(score: Array) -> tuple[Array, Array]:
+    """How much each shape counts if one of them is true, and if none is; the last score is that without the cause."""
+    above = score[:-1] - score.min()
+    plain, inexact = (np.exp(-0.5 * above / t) for t in (1.0, 1.0 + INEXACT * (score[-1] - score.min())))
+    return np.asarray(plain / plain.sum()), np.asarray(inexact / inexact.sum())
+
+
+def _usual(short: Data, members: Sequence[Member], best: int) -> int:
+    """Which of the shapes that are as good as the best of a family has the most usual numbers: from which those of the
+    others are the least away, all told, each by its weight. Which of them is a little better tells nothing of the
+    numbers; and one that knows one of them not, or cannot tell it, is none of them."""
+    cause = members[best].fit.structure.causes[members[best].index]
+    asked = [p for p in cause.form.parameters if p.required]
+    score = scores(short, members)
+    tied = [k for k in np.argsort(score, kind="stable").tolist() if score[k] <= score[best] + AS_GOOD]
+    if len(tied) == 1 or cause.of_the_law:  # whose numbers are each form's own
+        return best
+
+    def number(member: Member, p: Parameter) -> float:
+        if not member.variances.get(p.name, 0.0) > 0.0:
+            return np.nan
+        value = member.values[p.name]
+        return float(np.log(value)) if p.logarithmic else value / max(abs(members[best].values[p.name]), 1e-300)
+
+    numbers = np.array([[number(m, p) for p in asked] for m in members])
+    tied = [k for k in tied if np.isfinite(numbers[k]).all()]
+    if not tied:
+        return best
+    bare = refit(short, *reduced(members[best].fit, members[best].index), STEPS, NEARLY)
+    _, weight = weights(scores(short, [*members, Member(bare, -1)]))
+    away = {k: float(np.sum(weight @ np.minimum(np.nan_to_num(np.abs(numbers - numbers[k])), FAR) ** 2)) for k in tied}
+    usual = min(tied, key=away.__getitem__)
+    return best if best in away and away[usual] > LESS_ODD * away[best] else usual
 
 
 def _apart(short: Data, fit: Fit, index: int, others: Sequence[Member]) -> Fit:

@@ -14,13 +14,11 @@ from .data import Data
 from .gauge import gauged, in_the_mean
 from .numbers import Coordinate
 from .refit import Fit, chi2, errors, jacobian, reduced, refit
-from .shapes import Member, families, scores, stand_in
+from .shapes import FAR, Member, families, scores, stand_in, weights
 
 Array = NDArray[np.float64]
 
 UNKNOWN = 1.0  # variance of a logarithm with which nothing in the data moves
-INEXACT = 0.02  # of what a cause takes, that its true shape may be from the nearest of its family
-FAR = 0.25  # of a number, that a shape which fits worse counts as away at the most: further, it means another thing
 STEPS_WITHOUT, NEARLY = 8, 1e-5  # of the fit without a cause, and of χ², that a step of it must promise
 STEPS = np.geomspace(1e-4, 1.0, 25)  # of a number about which χ² is flat
 WIDEST = 1e6  # times the variance that the stand-in tells
@@ -93,10 +91,12 @@ def _of_the_shapes(short: Data, fit: Fit, own: Array) -> Array:
     out = np.zeros(len(fit.x))
     lead, kept = stand_in(short, fit)
     every = fit.structure.values(fit.x)
-    for index, family in enumerate(families(short, lead, range(len(kept)))):
+    causes = lead.structure.causes
+    indices = [k for k in range(len(kept)) if not causes[k].of_the_law]  # a law's numbers are each form's own
+    for index, family in zip(indices, families(short, lead, indices), strict=True):
         members = [family[0], *(_stated(short, m) for m in family[1:])]
         place, bare = kept[index], refit(short, *reduced(lead, index), STEPS_WITHOUT, NEARLY)
-        plain, rough = _weights(scores(short, [*members, Member(bare, -1)]))
+        plain, rough = weights(scores(short, [*members, Member(bare, -1)]))
         at = fit.structure.of_cause(place)
         for position, p in zip(range(at.start, at.stop), fit.structure.causes[place].fitted, strict=True):
             c = fit.structure.coordinates[position]
@@ -136,14 +136,7 @@ class _Away:
 def _away(member: Member, name: str, here: float, c: Coordinate, wider: float, own: float) -> _Away:
     far = FAR if c.logarithmic else FAR * abs(here) / c.unit
     if name not in member.variances:  # a choice of that form, which knows no such number
-        return _Away(float(np.sqrt(UNKNOWN)), 0.0, far)
+        return _Away(0.0, own, far)
     there = member.values[name]
     step = np.log(max(there, 1e-300) / here) if c.logarithmic else (there - here) / c.unit
     return _Away(abs(float(step)), min(max(wider * member.variances[name] - own, 0.0), own), far)
-
-
-def _weights(score: Array) -> tuple[Array, Array]:
-    """How much each shape counts if one of them is true, and if none is; the last score is that without the cause."""
-    above = score[:-1] - score.min()
-    plain, inexact = (np.exp(-0.5 * above / t) for t in (1.0, 1.0 + INEXACT * (score[-1] - score.min())))
-    return np.asarray(plain / plain.sum()), np.asarray(inexact / inexact.sum())
