@@ -20,7 +20,7 @@ from bench.places import Key
 from bench.plan import Plan, Problem, Segment, plan
 from bench.predict import LONGEST_S, Prediction, TooLong, predict
 from bench.protocol import Approach, Protocol
-from bench.rates import force_rate_Hz, motor_rate_Hz
+from bench.rates import force_rate_Hz, motor_rate_Hz, stairs_mm
 
 if TYPE_CHECKING:
     from sim.model import Model
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-9
+STAIRS = 0.01
+"""Of the longest way: steps of a streamed motion, from which they are worth a word."""
+
 TARE_S = 2.0
 """Taken for the tare in air when bench time is estimated."""
 
@@ -139,6 +142,7 @@ def check(
         )
         cure = "carry a vertical axis by a brake or a spring" if bench.motor.orientation == "vertical" else ""
         problems.append(Problem("", message, "notice", cure=cure))
+    problems += _stairs(planned, bench, protocol.sampling.motor)
     duration_s = float(prediction.time_s[-1])
     approach_s = _approach_s(protocol, bench)
     total_s = duration_s + approach_s
@@ -157,6 +161,22 @@ def check(
         surface_mm=None if planned.in_air else _surface_range(planned, outcomes),
         believed=believed is not None,
     )
+
+
+def _stairs(planned: Plan, bench: Bench, asked_Hz: float | None) -> Iterator[Problem]:
+    """A motor that is streamed so rarely that the pad feels each position by itself."""
+    speeds = [s.speed_mm_s for s in planned.segments if math.isfinite(s.speed_mm_s)]
+    depths = [abs(s.target_mm - s.start_mm) for s in planned.segments if math.isfinite(s.target_mm - s.start_mm)]
+    fastest, way_mm = max(speeds, default=0.0), max(depths, default=math.inf)
+    step_mm = stairs_mm(bench, fastest, asked_Hz)
+    if step_mm > STAIRS * way_mm:
+        every_ms = 1e3 / motor_rate_Hz(bench, asked_Hz)
+        message = (
+            f"the motor is told a position every {every_ms:.3g} ms: at {fastest:.3g} mm/s the pad feels stairs of "
+            f"{step_mm:.2g} mm, which no sample shows; what a fit tells of fast ramps is doubtful"
+        )
+        cure = "go slower, or set motor and bench file to 625 000 baud or more (docs/bench.md)"
+        yield Problem("", message, "notice", cure=cure)
 
 
 def _approach_s(protocol: Protocol, bench: Bench) -> float:

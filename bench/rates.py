@@ -1,8 +1,9 @@
 """How fast the devices of a bench file can be expected to answer, before any of them has been opened.
 
-For plans and preflight; a run uses what the opened drivers say. An Orca stream exchange is 9 + 19 bytes of 11 bits
-(docs/devices.md 6), a DAD 141.1 `SW` line 21 bytes of 10 bits and at most 600 a second (3.1); a device with a register
-map is read block by block, each a request of 8 bytes and a reply of 5 and two a register, behind its reply delay.
+For plans and preflight; where a motor takes longer to answer, a run goes by that. An Orca stream exchange is 9 + 19
+bytes of 11 bits behind the host's silence and the motor's, which are set alike (docs/devices.md 6, 7.3), a DAD 141.1
+`SW` line 21 bytes of 10 bits and at most 600 a second (3.1); a device with a register map is read block by block, each
+a request of 8 bytes and a reply of 5 and two a register, behind its reply delay.
 """
 
 from __future__ import annotations
@@ -10,15 +11,19 @@ from __future__ import annotations
 from typing import Literal
 
 from bench.config import Bench
+from drivers.orca import DEFAULT_BAUDRATE, default_gap_s
 from drivers.regmap import MotorMap, WriteBlock, load_map
 
 STREAM_HZ = 1000.0
 """What a streamed motor is asked for unless the bench file or the protocol says otherwise."""
 
+STAIRS_Hz = 400.0
+"""Positions a second below which a motor has reached each before it hears the next: a position loop settles in 2 ms."""
+
 LEAST_FORCE_Hz = 8.0
 """The tare takes a second, and eight readings."""
 
-_ORCA_BITS, _ORCA_BAUD = 28 * 11, 19200
+_ORCA_BITS = 28 * 11
 _LINES = {"dad141": (21 * 10, 115200, 600.0), "mt_sics": (18 * 10, 9600, 100.0)}
 """Load cells that send lines by themselves: bits of a line, baud rate and lines a second where the file gives none.
 
@@ -44,7 +49,9 @@ def motor_rate_Hz(bench: Bench, asked_Hz: float | None = None) -> float:
     """Samples a second to expect of the motor; `asked_Hz` is the protocol's wish, the wire's limit stands above it."""
     spec = bench.motor
     if streams(bench):
-        most = 1.0 / (_ORCA_BITS / (spec.baudrate or _ORCA_BAUD) + (spec.gap_us or 0) * 1e-6)
+        baudrate = spec.baudrate or DEFAULT_BAUDRATE
+        gap_s = default_gap_s(baudrate) if spec.gap_us is None else 1e-6 * spec.gap_us
+        most = 1.0 / (_ORCA_BITS / baudrate + 2.0 * gap_s)
         return min(asked_Hz or spec.rate or STREAM_HZ, most)
     usual, exchange_s = _polled(bench, "motor")
     return min(asked_Hz or spec.rate or usual, 1.0 / exchange_s)
@@ -102,6 +109,13 @@ def too_far_behind(bench: Bench, speed_mm_s: float, asked_Hz: float | None = Non
         return None
     told = f"at {speed_mm_s:.3g} mm/s a motor that is told a position every {1e3 / rate_Hz:.3g} ms"
     return f"{told} is {behind_mm:.2g} mm behind: limits.following_error is {allowed_mm:g} mm"
+
+
+def stairs_mm(bench: Bench, speed_mm_s: float, asked_Hz: float | None = None) -> float:
+    """From one position to the next that a streamed motor is told at a speed; 0 where that is too often for the motor
+    to come to rest in between, and of one that makes its moves by itself."""
+    rate_Hz = motor_rate_Hz(bench, asked_Hz)
+    return speed_mm_s / rate_Hz if streams(bench) and rate_Hz < STAIRS_Hz else 0.0
 
 
 def _polled(bench: Bench, device: Literal["motor", "load_cell"]) -> tuple[float, float]:

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from bench.run.runner import Outcome
     from sim.model import Model
 
+HELD_UP_S = 0.1
+"""By which moves may take longer than planned without a word."""
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
@@ -105,6 +108,12 @@ def _say_outcome(outcome: Outcome, bench: Bench, wall_s: float) -> None:
         f"{what}run: {outcome.bench_seconds:.1f} s of bench time in {wall_s:.1f} s{speed}, "
         f"{outcome.motor_samples} motor and {outcome.force_samples} force samples"
     )
+    if outcome.held_up_s > HELD_UP_S:
+        say(
+            f"note: moves took {outcome.held_up_s:.2g} s longer than planned: the motor could be told a position "
+            f"every {1e3 * outcome.motor_period_s:.3g} ms only, or this computer was late\n"
+            "  see that baud rate and interframe delay of the motor are those of the bench file (docs/bench.md)"
+        )
     found = outcome.findings
     if found.surface is not None:
         s = found.surface

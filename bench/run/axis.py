@@ -11,6 +11,8 @@ import contextlib
 import math
 from collections import deque
 from dataclasses import dataclass
+from itertools import pairwise
+from statistics import median
 from typing import Any, Protocol
 
 from bench.recording.schemas import HALT, MOVE
@@ -25,6 +27,9 @@ it): so far it goes on when the host is gone. Half of it is left when it is told
 
 SEGMENT_MM = 0.1
 """And no less than that, for slow moves: ten counts of an IAI controller."""
+
+REPLIES, SLOWER = 9, 1.03
+"""So many replies tell how often a motor answers, in times of what was planned."""
 
 
 class Curve(Protocol):
@@ -114,6 +119,9 @@ class Axis:
         self.clock = motor.link.clock
         self.live = False
         self.overruns = 0
+        self.held_up_s = 0.0
+        """By how much moves have taken longer than planned: for so long the motor could not be told where to go."""
+        self._replies_s: deque[float] = deque(maxlen=REPLIES)
         self._curve: Curve = Rest(0.0)
         self._start_s = 0.0
         self._next_s = 0.0
@@ -279,6 +287,7 @@ class Axis:
         if len(self._waiting) > 1:
             # The last command is still unanswered a whole period later: skip this one, and say so.
             self.overruns += 1
+            self._keep_to_replies(now_s)
             self._put_off(now_s + self.period_s - self._next_s)
             self._next_s = now_s + self.period_s
             return
@@ -297,7 +306,20 @@ class Axis:
     def _put_off(self, seconds: float) -> None:
         """Let a streamed profile go on where it was, so much later: a set-point that jumps is a blow to the pad."""
         if self.motor.kind == "stream":
+            if not self.ended(self._next_s):
+                self.held_up_s += seconds
             self._start_s += seconds
+
+    def _keep_to_replies(self, now_s: float) -> None:
+        """From now on as often as the motor answers, where it has taken longer than planned again and again: its own
+        silence before a reply, or an adapter's, are set to what nobody knew. Else each move would be held up."""
+        if self.motor.kind != "stream" or len(self._replies_s) < REPLIES:
+            return
+        apart_s = median(b - a for a, b in pairwise(self._replies_s))  # one command waits: that is a whole exchange
+        if apart_s > SLOWER * self.period_s:
+            self.period_s = apart_s
+            self._replies_s.clear()
+            self.told.append((now_s, "motor_slower", {"period_s": apart_s}))
 
     def collect(self) -> list[tuple[MotorSample, float]]:
         """Samples that have come, each with the position commanded when it was measured; errors go to `failures`."""
@@ -310,6 +332,7 @@ class Axis:
                 self._doubtful |= isinstance(exchange.error, DeviceTimeout)
                 continue
             sample = exchange.result()
+            self._replies_s.append(sample.received_s)
             if self._doubtful and self.live and self._steps is None:
                 # it answers again: has it been off, and lost its clamps?
                 self._doubtful, self._checking = False, True

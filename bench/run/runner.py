@@ -64,6 +64,9 @@ class Outcome:
     bench_seconds: float
     motor_samples: int
     force_samples: int
+    held_up_s: float
+    """By how much moves took longer than planned, because the motor answered too slowly."""
+    motor_period_s: float
 
     @property
     def recording(self) -> Path:
@@ -166,6 +169,7 @@ def _run(
             "cause": cause or "",
             "bench_seconds": f"{seconds:.3f}",
             "overruns": loop.axis.overruns,
+            "held_up_s": f"{loop.axis.held_up_s:.3f}",
             "late_turns": loop.late_turns,
             "longest_turn_s": f"{loop.longest_turn_s:.4f}",
             "traffic": rig.traffic(),
@@ -175,7 +179,8 @@ def _run(
     )
     if failure is not None:
         raise failure
-    return Outcome(folder, cause or problem, run.found, seconds, loop.motor_count, loop.force_count)
+    counts = loop.motor_count, loop.force_count
+    return Outcome(folder, cause or problem, run.found, seconds, *counts, loop.axis.held_up_s, loop.axis.period_s)
 
 
 @contextmanager

@@ -76,11 +76,11 @@ def _link(spec: Settings, key: str, default: Any) -> Any:
 
 
 def _orca(spec: Settings, clock: SimClock, plant: BenchPlant, noise: GaussianNoise) -> tuple[Line, object]:
-    """Set up as its maker advises: 80 µs interframe delay at high baudrates, 2000 µs as delivered else."""
+    """Set up as its maker advises: 80 µs interframe delay from 625 000 baud on, 2000 µs as delivered else."""
     baudrate = int(spec.get("baudrate") or 19200)
     gap_us = spec.get("gap_us")
     if gap_us is None:
-        gap_us = 80 if baudrate > 115200 else 2000
+        gap_us = 80 if baudrate >= 625_000 else 2000
     line = Line(clock, baudrate, str(spec.get("parity") or "E"))
     drive = Drive(clock, plant, noise, direction=int(spec.get("direction") or 1), quantum_mm=0.001)
     return line, Orca(line, drive, address=int(spec.get("address") or 1), delay_us=int(gap_us))
