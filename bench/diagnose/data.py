@@ -13,7 +13,7 @@ from bench.errors import InputError
 from bench.felt_motion import Felt, felt
 from bench.identify.noise import stiffness_along
 from bench.identify.past import begins_inside
-from bench.identify.problem import sized, touches
+from bench.identify.problem import must_vary, sized, touches
 from bench.position_noise import resolution
 from bench.recording.types import Measurement
 from bench.restamp import restamped
@@ -266,10 +266,8 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         m = replace(m, force_time_s=m.force_time_s[inside], force_N=m.force_N[inside])
         good = good[inside]
     sized(m)
-    if m.counted().any() and not np.ptp(m.force_N[m.counted()]):
-        level = float(m.force_N[m.counted()][0])
-        said = f"the force is {f'{level:.6g} N' if level else 'zero'} throughout"
-        raise InputError(m.name, said, "Is the force channel connected, its column right?")
+    if m.counted().any():
+        must_vary([m])
     if m.surface_std_mm > 0 and not touches(m):  # with a surface found by touch-off there is a pad
         raise InputError(
             m.name,

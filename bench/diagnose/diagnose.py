@@ -13,6 +13,7 @@ from bench import identify
 from bench.errors import InputError
 from bench.identify.motion import holds
 from bench.identify.past import fitted_past
+from bench.identify.problem import must_touch
 from bench.recording.types import Measurement
 from sim.effects import all_effects
 from sim.model import Model
@@ -57,6 +58,8 @@ def diagnose(m: Measurement, believed: Model, progress: Callable[[str], None] | 
     begun = time.perf_counter()
     tell = progress or (lambda _: None)
     tell("reading the channels")
+    if believed.pad.elastic.law != "none":
+        must_touch([m])
     flags = not_of_the_motion(m, with_pulses(m, without_noise(m, faults(m.force_N))))
     prepared = prepare(m, flags.good)
     structure = believed_structure(believed, prepared)

@@ -92,8 +92,8 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
 
     `between`: with nodes where the motion between samples matters; `blocks`: very long runs as block means.
     Raises InputError, naming the measurement, where there is nothing to fit: fewer than 20 force samples that count,
-    no sample deeper than the surface (while the force counts), no force at all, numbers that are not finite, times
-    that do not increase; and for numbers that are none of a bench (`sized`).
+    no pad that is pressed (`must_touch`), numbers that are not finite, times that do not increase; and for numbers that
+    are none of a bench (`sized`).
     """
     if not measurements:
         raise InputError("fit", "no measurement given")
@@ -101,15 +101,7 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
     checked = [_checked(m, notes) for m in measurements]
     depth = max(float(m.position_mm.max()) for m in checked)
     force = max(_largest(m) for m in checked)
-    names = ", ".join(m.name for m in checked)
-    if depth <= 0:
-        raise InputError(names, "the position never passes the surface (0 mm), so there is no contact to fit",
-                         "Is the sign of the position right, and its zero at the surface?")  # fmt: skip
-    if not any(touches(m) for m in checked):
-        raise InputError(names, "the probe is never in the pad where the force counts, so there is no contact to fit",
-                         "Was the run stopped before its first step reached the pad?")  # fmt: skip
-    if force <= 0:
-        raise InputError(names, "the force is zero throughout", "Is the force channel connected, its column right?")
+    must_touch(checked)
     runs: list[Run] = []
     where: list[NDArray[np.intp]] = []
     in_moves = in_all = 0
@@ -129,6 +121,33 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
         tuple(runs), depth, force, tuple(checked), tuple(where), tuple(notes),
         rebuilt=in_moves + in_all > 0, moves_rebuilt=in_moves > 0,
     )  # fmt: skip
+
+
+def must_touch(measurements: Sequence[Measurement]) -> None:
+    """Raises InputError, naming them, where none of some measurements shows a pad that is pressed: no sample deeper
+    than the surface, or not while the force counts, or a force that is the same throughout."""
+    names = ", ".join(m.name for m in measurements)
+    if max(float(m.position_mm.max()) for m in measurements) <= 0:
+        raise InputError(names, "the position never passes the surface (0 mm), so there is no contact to fit",
+                         "Is the sign of the position right, and its zero at the surface?")  # fmt: skip
+    if not any(touches(m) for m in measurements):
+        raise InputError(names, "the probe is never in the pad where the force counts, so there is no contact to fit",
+                         "Was the run stopped before its first step reached the pad?")  # fmt: skip
+    must_vary(measurements)
+
+
+def must_vary(measurements: Sequence[Measurement]) -> None:
+    """Raises InputError, naming them, where the force of each of some measurements is the same throughout."""
+    level_N = 0.0
+    for m in measurements:
+        counted = m.counted()
+        lowest = float(np.min(m.force_N, initial=np.inf, where=counted))
+        if lowest < float(np.max(m.force_N, initial=-np.inf, where=counted)):
+            return
+        level_N = lowest if counted.any() else level_N
+    said = f"the force is {f'{level_N:.6g} N' if level_N else 'zero'} throughout"
+    names = ", ".join(m.name for m in measurements)
+    raise InputError(names, said, "Is the force channel connected, its column right?")
 
 
 def touches(m: Measurement) -> bool:

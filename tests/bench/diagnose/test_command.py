@@ -78,6 +78,8 @@ def test_the_extended_model_reproduces_the_error(id):
         (("short.csv", "--model", "polyurethane"), (r"force samples can be used",)),
         (("dead.csv", "--model", "polyurethane"), (r"dead: the force is zero throughout", "connected")),
         (("stuck.csv", "--model", "polyurethane"), (r"stuck: the force is 0\.25 N throughout", "connected")),
+        (("turned.csv", "--model", "polyurethane"), (r"turned: the position never passes the surface", "sign")),
+        (("still.csv", "--model", "polyurethane"), (r"still: the position never passes the surface", "zero")),
         (("{data}", "--model", "polyurethane", "--json", "no/where.json"), (r"there is no folder no",)),
         (("{data}", "--model", "polyurethane", "--next", "no/where.yaml"), (r"there is no folder no",)),
         (("{data}", "--model", "broken.yaml"), (r"broken\.yaml",)),
@@ -88,6 +90,9 @@ def test_bad_input_is_said_in_one_message(padbench, csv, words, patterns):
     Path("short.csv").write_text("time_s,position_mm,force_N\n" + "".join(f"{k / 10},{k},{k}\n" for k in range(5)))
     for name, level in (("dead", 0.0), ("stuck", 0.25)):
         rows = (f"{k / 50},{min(k / 100, 2.0)},{level}\n" for k in range(500))
+        Path(f"{name}.csv").write_text("time_s,position_mm,force_N\n" + "".join(rows))
+    for name, way in (("turned", -1.0), ("still", 0.0)):
+        rows = (f"{k / 50},{way * min(k / 100, 2.0)},{min(k / 100, 2.0)}\n" for k in range(500))
         Path(f"{name}.csv").write_text("time_s,position_mm,force_N\n" + "".join(rows))
     Path("broken.yaml").write_text("pad: {elastic: {law: exponential, m: -1, b: 2}}\n")
     said = padbench("diagnose", *(csv if word == "{data}" else word for word in words))

@@ -115,6 +115,7 @@ def in_pad_s(m: Measurement) -> float:
         (lambda m: replace(m, fit_to_s=0.9 * in_pad_s(m)), "never in the pad where the force counts"),
         (lambda m: replace(m, surface_std_mm=float(m.position_mm.max()) / 2.9), "never in the pad"),
         (lambda m: replace(m, force_N=0 * m.force_N), "force is zero throughout"),
+        (lambda m: replace(m, force_N=0 * m.force_N + 1.5), r"force is 1\.5 N throughout"),
         (lambda m: replace(m, force_time_s=m.force_time_s[:9], force_N=m.force_N[:9]), "only 9 force samples"),
         (lambda m: replace(m, fit_from_s=1e9), "only 0 force samples"),
         (lambda m: replace(m, force_N=np.where(m.force_time_s > 3, np.nan, m.force_N)), "not finite"),
