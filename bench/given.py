@@ -14,7 +14,7 @@ from bench.predict import Prediction, TooLong, predict
 from bench.protocol import Protocol
 from bench.recording import Recording
 from bench.recording.schemas import BENCH_FILE, PROTOCOL_FILE
-from bench.run.folder import MODEL
+from bench.shipped import MODEL
 from sim.model import Model
 
 M = TypeVar("M", bound=BaseModel)

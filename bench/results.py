@@ -23,7 +23,8 @@ from bench.recording import Recording, read_recording
 from bench.recording.schemas import NO_SURFACE
 from bench.report import Plan as PlannedCurve
 from bench.report import write_report
-from bench.run.folder import FIT, MODEL, REPORT
+from bench.run.folder import FIT, REPORT
+from bench.shipped import MODEL
 from sim.effects.reading import force
 from sim.model import Model
 

@@ -1,4 +1,4 @@
-"""The protocols, benches and pads that come with padbench, by name, and files beside them."""
+"""Protocols, benches and pads: a file, what comes with padbench by name, or the model that a run folder holds."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from bench.errors import InputError
 
 Kind = Literal["protocol", "bench", "pad"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+MODEL = "model.yaml"
+"""What a run folder calls the model that was fitted."""
+
 _FOLDERS: dict[Kind, str] = {"protocol": "", "bench": "benches", "pad": "pads"}
 
 
@@ -34,6 +37,8 @@ def find_file(kind: Kind, name_or_path: str | Path) -> Path:
         raise InputError(kind, "a file name cannot hold a NUL character")
     if path.is_file():
         return path
+    if kind == "pad" and (path / MODEL).is_file():  # what a run has fitted
+        return path / MODEL
     found = find_shipped(kind, name)
     if found is not None:
         return found

@@ -119,7 +119,13 @@ class _Builder:
 
     def _mapping(self, node: yaml.MappingNode, path: tuple[Key, ...]) -> dict[Key, Any]:
         data: dict[Key, Any] = {}
+        before = ""
         for key_node, value_node in node.value:
+            if _is_decimal_comma(before, key_node, value_node):
+                number = f"{before},{key_node.value}"
+                cure = f"write {before}.{key_node.value}"
+                raise _Refusal(key_node.start_mark, f"`{number}`: numbers have a decimal point here", cure, path)
+            before = value_node.value if isinstance(value_node, yaml.ScalarNode) else ""
             key = _scalar(key_node, path) if isinstance(key_node, yaml.ScalarNode) else None
             if isinstance(key, bool) or not isinstance(key, str | int):
                 raise _Refusal(key_node.start_mark, "a key must be a word or a whole number", "", path)
@@ -131,6 +137,13 @@ class _Builder:
             self.places.keys[(*path, key)] = (line, column)
             data[key] = self.build(value_node, (*path, key))
         return data
+
+
+def _is_decimal_comma(before: str, key: yaml.Node, value: yaml.Node) -> bool:
+    """Whether what stands after a comma is no key, but the rest of the number before it: `{to: 0,5, speed: 2}`."""
+    empty = isinstance(value, yaml.ScalarNode) and value.value == "" and value.style is None
+    digits = isinstance(key, yaml.ScalarNode) and key.style is None and key.value.isdigit()
+    return empty and digits and before.lstrip("+-").isdigit()
 
 
 def _scalar(node: yaml.Node, path: tuple[Key, ...]) -> Any:

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("data", type=Path, metavar="DATA", help="MCAP, run folder or CSV")
-    parser.add_argument("--model", required=True, metavar="MODEL", help="the model believed: file or shipped name")
+    parser.add_argument(
+        "--model", required=True, metavar="MODEL", help="the model believed: file, run folder or shipped name"
+    )
     add_columns(parser)
     add_json(parser, "write diagnosis.json there; - for standard output alone")
     add_output(parser, "--write", kinds=("yaml",), type=Path, metavar="MODEL2", help="write the extended model as YAML")

@@ -31,10 +31,10 @@ def main(args: argparse.Namespace) -> int:
     """Write the export."""
     from bench.config import load_model
     from bench.export import c_header, describe
+    from bench.shipped import find_file
 
-    path = _file(args.model)
-    model = load_model(path)
-    source = Path(path).name
+    model = load_model(args.model)
+    source = find_file("pad", args.model).name
     if args.to == "c":
         text = c_header(model, args.rate, name=args.name, source=source, pad_only=args.pad_only)
     else:
@@ -49,9 +49,3 @@ def main(args: argparse.Namespace) -> int:
         raise InputError(args.out, f"cannot be written: {error.strerror}", "name another file with --out") from None
     print(f"wrote {args.out}: {'C header' if args.to == 'c' else 'JSON'} for a loop of {args.rate:g} Hz")
     return EXIT_DONE
-
-
-def _file(model: str) -> str:
-    """The model of a run folder, or the name as given."""
-    in_folder = Path(model) / "model.yaml"
-    return str(in_folder) if model and Path(model).is_dir() and in_folder.is_file() else model

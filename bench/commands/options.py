@@ -21,7 +21,7 @@ def add_bench(parser: argparse.ArgumentParser) -> None:
     """`--bench` and `--pad`."""
     parser.add_argument("--bench", metavar="BENCH", help="bench file or shipped name (default: simulated, as shipped)")
     parser.add_argument(
-        "--pad", metavar="MODEL", help="the pad as the lab believes it to be: model file or shipped name"
+        "--pad", metavar="MODEL", help="the pad as the lab believes it to be: model file, run folder or shipped name"
     )
 
 

@@ -20,7 +20,7 @@ MOST = 2_000_000  # samples, of a protocol of hours
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("model", metavar="MODEL", help="model file or shipped pad's name")
+    parser.add_argument("model", metavar="MODEL", help="model file, run folder or shipped pad's name")
     motion = parser.add_mutually_exclusive_group(required=True)
     motion.add_argument("--protocol", metavar="P", help="the planned motion of a protocol")
     motion.add_argument(

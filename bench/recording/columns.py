@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping, Sequence
 
 from bench.errors import InputError
@@ -78,6 +79,20 @@ def place_columns(header: Sequence[str], columns: Mapping[str, str] | None, plac
             "--columns", "names one column twice", "time, position and force stand in columns of their own"
         )
     return found
+
+
+def misread(header: Sequence[str], place: Mapping[str, int], units: Mapping[str, str] | None) -> list[str]:
+    """A word on each column whose name ends with another unit than it is read in, of which nothing was said."""
+    said = dict(units or {})
+    words = []
+    for what, index in place.items():
+        own, name = NAMES[what].rpartition("_")[2], header[index]
+        ending = re.search(r"[_ /(\[]([^\W\d_]+)[)\]]?\s*$", name)
+        unit = ending[1].replace("\u03bc", "µ") if ending else own
+        if what in said or (what == "force_time" and "time" in said) or unit == own or unit not in UNITS[what]:
+            continue
+        words.append(f"column {name!r} is read in {own}, and its name says {unit}: then add --units {what}={unit}")
+    return words
 
 
 def _cure(missing: Sequence[tuple[str, str]], header: Sequence[str]) -> str:

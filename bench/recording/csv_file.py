@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.errors import InputError
-from bench.recording.columns import NAMES, factors, place_columns
+from bench.recording.columns import NAMES, factors, misread, place_columns
 from bench.recording.csv_text import Table, read_table
 from bench.recording.types import Array, ForceChannel, MotorChannel, Recording
 
@@ -55,7 +55,7 @@ def read_csv(path: Path, columns: Mapping[str, str] | None = None, units: Mappin
             flagged=np.nan_to_num(side[OVERLOAD][at_force]) != 0.0,
         ),
         surface_mm=0.0,
-        notes=[f"{path}: {note}" for note in table.notes],
+        notes=[f"{path}: {note}" for note in (*table.notes, *misread(table.header, place, units))],
     )
     row_time = np.where(np.isnan(time), force_time, time)
     rows = np.flatnonzero(~np.isnan(row_time))

@@ -13,7 +13,6 @@ from bench.errors import InputError, Refused
 from bench.recording.lock import holding
 
 RECORDING = "recording.mcap"
-MODEL = "model.yaml"
 FIT = "fit.json"
 REPORT = "report.html"
 RUNS = "runs"

@@ -24,7 +24,7 @@ from bench.rates import force_rate_Hz, motor_rate_Hz
 from bench.recording.unfinished import Left
 from bench.recording.writer import Recorder
 from bench.run.axis import Axis
-from bench.run.folder import MODEL, RECORDING
+from bench.run.folder import RECORDING
 from bench.run.foresight import Foresight
 from bench.run.loop import Loop
 from bench.run.rig import Rig, is_simulated, open_rig
@@ -33,6 +33,7 @@ from bench.run.script import Findings, Run
 from bench.run.signals import SIGNALS as SIGNALS
 from bench.run.signals import Operator, listening
 from bench.run.touchoff import warm_up
+from bench.shipped import MODEL
 from bench.yamlfile import parse, validate
 from drivers.errors import DriverError
 

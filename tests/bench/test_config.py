@@ -9,7 +9,7 @@ import pytest
 from bench.config import load_bench, load_model, simulated
 from bench.errors import InputError
 from bench.schemas import schema
-from bench.shipped import find_shipped, shipped_names
+from bench.shipped import find_file, find_shipped, shipped_names
 from tests.bench.run.benches import bench_file as changed_bench
 
 REAL = """\
@@ -203,3 +203,11 @@ def test_ports_that_do_not_belong_together(padbench, tmp_path, motor, load_cell,
         assert said.status == 2 and words in said.err and f"bench.yaml:{at}:" in said.err
     said = padbench("status", path, "--simulated")
     assert said.status == 0, said
+
+
+def test_the_model_of_a_run_is_its_folder_s(tmp_path: Path) -> None:
+    (tmp_path / "model.yaml").write_text(find_file("pad", "silicone").read_text("utf-8"), "utf-8")
+    assert load_model(tmp_path) == load_model("silicone")
+    (tmp_path / "model.yaml").unlink()
+    with pytest.raises(InputError, match="is a directory, not a file"):
+        load_model(tmp_path)

@@ -67,6 +67,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     ("text", "place", "words"),
     [
         ("a: 1\nb: 2\na: 3\n", "x.yaml:3:1", "a: this key is given twice"),
+        ("a: {to: 0,5, speed: 2}", "x.yaml:1:11", "a: `0,5`: numbers have a decimal point here"),
         ("a: {b: 1, c: {d: 1, d: 2}}", "x.yaml:1:21", "a.c.d: this key is given twice"),
         ("a: !!python/object/apply:os.system [echo]", "x.yaml:1:4", "tag"),
         ("a: !!float 3", "x.yaml:1:4", "tag"),

@@ -122,6 +122,25 @@ def test_extra_columns_are_kept(tmp_path):
     assert recording.extra_text["phase"] == ["down", "down", "hold"]
 
 
+@pytest.mark.parametrize(
+    ("header", "units", "said"),
+    [
+        ("t_ms,way (mm),load [mN]", "", {"t_ms": "time=ms", "load [mN]": "force=mN"}),
+        ("t_ms,way (mm),load [mN]", "time=ms,force=N", {}),
+        ("t,way/µm,force kN", "", {"way/µm": "position=µm", "force kN": "force=kN"}),
+        ("time_s,way_in_pad,force_total", "", {}),
+    ],
+)
+def test_a_unit_in_a_column_s_name_that_is_not_the_one_it_is_read_in_is_told(tmp_path, header, units, said):
+    names = header.split(",")
+    columns = dict(zip(("time", "position", "force"), names, strict=True))
+    text = header + "\n0,0,0.1\n1,0.5,0.2\n2,1,0.4\n"
+    notes = read_recording(written(tmp_path, text), columns, parse_units(units) if units else None).notes
+    assert len(notes) == len(said)
+    for (name, unit), note in zip(said.items(), notes, strict=True):
+        assert repr(name) in note and f"--units {unit}" in note
+
+
 def test_columns_and_units_are_mapped(tmp_path):
     text = "t;way;load;mine\n0;0;1000;3\n500;0.001;2000;4\n"
     columns = parse_columns("time=t, position=way,force=load")
