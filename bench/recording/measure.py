@@ -63,6 +63,8 @@ def measurement_of(recording: Recording) -> Measurement:
     if recording.surface_mm is None:
         raise InputError(place, "has no touch-off: where the pad begins is not known", cure or "did the run reach it?")
     notes = list(recording.notes)
+    if recording.run and recording.result is None:
+        notes.append(f"this run did not come to its end: it is there to {float(recording.load_cell.time_s[-1]):.4g} s")
     delays = delays_of(recording)
     if delays != Delays():
         notes.append(

@@ -119,8 +119,9 @@ def _verdicts(recording: Recording, fit: FitView | None, problem: str) -> str:
 
 
 APART = (
-    "These figures and those of the fit differ a little: the fit takes positions as they were reported, the diagnosis "
-    "the motion as the pad felt it. So less of the positions' noise is in its floor and its errors."
+    "These figures and those of the fit differ: the fit takes positions as they were reported, the diagnosis the "
+    "motion as the pad felt it, so that less of the positions' noise is in its floor and its errors; and each holds "
+    "out blocks of its own, which matters most where a run is short."
 )
 
 

@@ -21,6 +21,9 @@ LAWS = {
     "none": ("no", "Fᵉ = 0: free air"),
 }
 
+DOWN_TO = 1.05
+"""Times the noise: with more, a tenth of the power is something else, which a diagnosis may well name."""
+
 FINISHED = frozenset({"finished", "done", "complete", "completed", "ok", "success"})
 _STOPS = ("limit", "overload", "fault", "stopped", "interrupted", "error", "aborted", "stop")
 
@@ -136,7 +139,7 @@ def judge(fit: FitView) -> tuple[str, str]:
     ratio = rmse / floor if floor > 0 else math.nan
     if not math.isfinite(ratio):
         return "plain", "A model was fitted"
-    if ratio <= 1.15:
+    if ratio <= DOWN_TO:
         return "good", "The model explains the force down to the noise"
     if ratio <= 2.0:
         return "good", "The model is close to the noise"

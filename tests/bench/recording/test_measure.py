@@ -57,6 +57,16 @@ def test_forces_before_the_tare_are_on_the_zero_that_it_set():
     np.testing.assert_allclose(m.force_N, gross - 0.2304, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("result", "said"), [(None, True), ({"status": "done"}, False), ({"status": "stopped"}, False)]
+)
+def test_a_run_without_an_end_is_called_one(result, said):
+    times = np.arange(4.0)
+    recording = recording_of((times, times), (times, times), run={"protocol": "quick"}, result=result)
+    notes = recording.measurement().notes
+    assert any("did not come to its end: it is there to 3 s" in note for note in notes) is said
+
+
 def test_csv_counts_throughout(tmp_path):
     path = tmp_path / "pad 3.csv"
     path.write_text("time_s,position_mm,force_N\n0,0,0.1\n0.1,1,0.2\n0.2,2,0.3\n")

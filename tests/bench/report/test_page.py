@@ -68,6 +68,7 @@ def test_undetermined_is_said_in_words(run: Recording) -> None:
     ("changes", "tone", "said"),
     [
         ({"rmse": 0.0122}, "good", "down to the noise"),
+        ({"rmse": 0.0132}, "good", "close to the noise"),
         ({"rmse": 0.0122, "converged": False}, "bad", "did not converge"),
         ({"rmse": 0.0122, "physical": False}, "bad", "is not a relaxation"),
         ({"rmse": 0.0122, "undetermined": ["b"]}, "fair", "do not determine b"),
