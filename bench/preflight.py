@@ -173,7 +173,7 @@ def _stairs(planned: Plan, bench: Bench, asked_Hz: float | None) -> Iterator[Pro
         every_ms = 1e3 / motor_rate_Hz(bench, asked_Hz)
         message = (
             f"the motor is told a position every {every_ms:.3g} ms: at {fastest:.3g} mm/s the pad feels stairs of "
-            f"{step_mm:.2g} mm, which no sample shows; what a fit tells of fast ramps is doubtful"
+            f"{step_mm:.2g} mm, which no sample shows: forces felt meanwhile cost nothing in a fit"
         )
         cure = "go slower, or set motor and bench file to 625 000 baud or more (docs/bench.md)"
         yield Problem("", message, "notice", cure=cure)

@@ -11,14 +11,12 @@ from __future__ import annotations
 from typing import Literal
 
 from bench.config import Bench
+from bench.recording.stairs import RAREST_Hz
 from drivers.orca import DEFAULT_BAUDRATE, default_gap_s
 from drivers.regmap import MotorMap, WriteBlock, load_map
 
 STREAM_HZ = 1000.0
 """What a streamed motor is asked for unless the bench file or the protocol says otherwise."""
-
-STAIRS_Hz = 400.0
-"""Positions a second below which a motor has reached each before it hears the next: a position loop settles in 2 ms."""
 
 LEAST_FORCE_Hz = 8.0
 """The tare takes a second, and eight readings."""
@@ -115,7 +113,7 @@ def stairs_mm(bench: Bench, speed_mm_s: float, asked_Hz: float | None = None) ->
     """From one position to the next that a streamed motor is told at a speed; 0 where that is too often for the motor
     to come to rest in between, and of one that makes its moves by itself."""
     rate_Hz = motor_rate_Hz(bench, asked_Hz)
-    return speed_mm_s / rate_Hz if streams(bench) and rate_Hz < STAIRS_Hz else 0.0
+    return speed_mm_s / rate_Hz if streams(bench) and rate_Hz < RAREST_Hz else 0.0
 
 
 def _polled(bench: Bench, device: Literal["motor", "load_cell"]) -> tuple[float, float]:

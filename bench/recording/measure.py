@@ -17,6 +17,7 @@ from bench import yamlfile
 from bench.errors import InputError
 from bench.recording.between import between_polls
 from bench.recording.schemas import BENCH_FILE, NO_SURFACE, STOPPED
+from bench.recording.stairs import stairs
 from bench.recording.types import Array, Event, Measurement, Recording
 
 GAP = 5.0
@@ -101,6 +102,8 @@ def measurement_of(recording: Recording) -> Measurement:
         position_time, position, doubtful = between.time_s, between.position_mm, between.doubtful
         stamp_std = between.stamp_std_s
         notes += between.notes
+    else:
+        doubtful = _stairs(recording, position_time, position, (force_time, force), notes)
     return Measurement(
         name=_name(recording.source),
         position_time_s=position_time,
@@ -117,6 +120,20 @@ def measurement_of(recording: Recording) -> Measurement:
         doubtful=doubtful,
         stamp_std_s=stamp_std,
     )
+
+
+def _stairs(
+    recording: Recording, time_s: Array, position_mm: Array, force: tuple[Array, Array], notes: list[str]
+) -> list[tuple[float, float]]:
+    told = np.interp(time_s, recording.motor.time_s - delays_of(recording).position_s, recording.motor.command_mm)
+    spans = stairs(time_s, position_mm, told, *force)
+    if spans:
+        lasts_s, rate_Hz = sum(end - begin for begin, end in spans), 1.0 / float(np.median(np.diff(time_s)))
+        notes.append(
+            f"force: {lasts_s:.2g} s of fast motion cost nothing in a fit: the motor was told a position only "
+            f"{rate_Hz:.3g} times a second, and what the pad felt between two of them no sample shows"
+        )
+    return spans
 
 
 def delays_of(recording: Recording) -> Delays:

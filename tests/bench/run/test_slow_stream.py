@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from bench import identify
 from bench.config import load_bench
 from bench.preflight import check
 from bench.protocol import load_protocol
 from bench.rates import motor_rate_Hz
 from tests.bench.run.benches import AIR, SHORT, Done, bench_file, once, protocol_file, run
+from tests.bench.run.test_polled_axis import TRUE
 
 SLOW: dict[str, Any] = AIR | {"steps": [{"to": 2.0, "speed": 4, "hold": 0.5}, {"to": 0.0, "speed": 8, "hold": 0.5}]}
 
@@ -57,6 +60,24 @@ def test_a_motor_that_is_slower_than_the_bench_file_knows_is_told_as_often_as_it
     assert slower.data["period_s"] == pytest.approx(0.0054, rel=0.05)
     assert done.outcome.motor_period_s == slower.data["period_s"]
     assert done.outcome.held_up_s == float(done.result["held_up_s"]) < 0.1
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3, 4))])
+def test_what_is_felt_amid_stairs_costs_nothing_and_the_pad_is_found(tmp_path: Any, seed: int) -> None:
+    done = run(tmp_path, "quick", motor={"baudrate": 115200}, simulation={"seed": seed})
+    m = done.recording.measurement()
+    assert any("150 times a second" in note for note in m.notes) and 0.5 < sum(b - a for a, b in m.doubtful) < 5.0
+    blind, fitted = (
+        identify.fit([data], law="exponential", order=2, contact="unilateral") for data in (replace(m, doubtful=[]), m)
+    )
+    assert fitted.rmse < 1.03 * fitted.noise_floor < 0.9 * blind.rmse
+    for name, true in TRUE.items():
+        found = fitted.parameters[name]
+        assert abs(found.value - true) < 4.0 * found.std < 0.04 * true, name
+
+
+def test_a_motor_that_hears_often_enough_makes_no_stairs(tmp_path: Any) -> None:
+    assert not run(tmp_path, SHORT, motor={"baudrate": 625000}).recording.measurement().doubtful
 
 
 @pytest.mark.parametrize(("baudrate", "said"), [(115200, True), (1_000_000, False)])
