@@ -28,7 +28,7 @@ it): so far it goes on when the host is gone. Half of it is left when it is told
 SEGMENT_MM = 0.1
 """And no less than that, for slow moves: ten counts of an IAI controller."""
 
-REPLIES, SLOWER = 9, 1.03
+REPLIES, SLOWER = 25, 1.03
 """So many replies tell how often a motor answers, in times of what was planned."""
 
 
