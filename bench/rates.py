@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Literal
 
 from bench.config import Bench
-from bench.recording.stairs import RAREST_Hz
+from bench.recording.stairs import STREAMED, RAREST_Hz
 from drivers.orca import DEFAULT_BAUDRATE, default_gap_s
 from drivers.regmap import MotorMap, WriteBlock, load_map
 
@@ -31,7 +31,7 @@ How often an MT-SICS device sends differs by model: `rate` of the bench file say
 
 def streams(bench: Bench) -> bool:
     """Whether the motor takes a position every tick, rather than making whole moves by itself."""
-    return bench.motor.driver == "orca"
+    return bench.motor.driver in STREAMED
 
 
 def speed_step_mm_s(bench: Bench) -> float:

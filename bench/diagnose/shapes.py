@@ -36,9 +36,7 @@ AS_GOOD = 4.0  # Δχ² by which one that is near to what was believed may be wo
 HARDLY_WORSE = 25.0  # Δχ² by which one wave that swells may be worse than two
 SAME = 1.0  # Δχ² by which a shape is no other
 INEXACT = 0.02  # of what a cause takes, that its true shape may be from the nearest of its family
-LESS_ODD = (
-    0.7  # times as far from the other shapes, in squares, as the best: a shape whose numbers are taken for its own
-)
+LESS_ODD = 0.7  # times as far, in squares, from the others of its family: a shape that is taken for its numbers
 FAR = 0.25  # of a number, that a shape which fits worse counts as away at the most: further, it means another thing
 LEFT = 1.03  # times the noise power: what leaves more may have a period beyond those sought
 IN_STEP = 0.3  # of the position's power, that is at a frequency: then the motion swings with it

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench import yamlfile
 from bench.errors import InputError
+from bench.places import Key
 from bench.recording.between import between_polls
 from bench.recording.schemas import BENCH_FILE, NO_SURFACE, STOPPED
-from bench.recording.stairs import stairs
+from bench.recording.stairs import STREAMED, Spans, stairs
 from bench.recording.types import Array, Event, Measurement, Recording
 
 GAP = 5.0
@@ -95,7 +97,7 @@ def measurement_of(recording: Recording) -> Measurement:
     _report_gaps("force", force_time, notes)
     _report_spikes("position", position_time, position, notes)
     _report_spikes("force", force_time, force, notes)
-    doubtful: list[tuple[float, float]] = []
+    doubtful: Spans = []
     stamp_std = 0.0
     between = between_polls(recording.events, position_time, position, force_time, force)
     if between is not None:
@@ -103,7 +105,7 @@ def measurement_of(recording: Recording) -> Measurement:
         stamp_std = between.stamp_std_s
         notes += between.notes
     else:
-        doubtful = _stairs(recording, position_time, position, (force_time, force), notes)
+        doubtful = _stairs(recording, position_time, (force_time, force), notes)
     return Measurement(
         name=_name(recording.source),
         position_time_s=position_time,
@@ -122,11 +124,13 @@ def measurement_of(recording: Recording) -> Measurement:
     )
 
 
-def _stairs(
-    recording: Recording, time_s: Array, position_mm: Array, force: tuple[Array, Array], notes: list[str]
-) -> list[tuple[float, float]]:
+def _stairs(recording: Recording, time_s: Array, force: tuple[Array, Array], notes: list[str]) -> Spans:
+    """Where a streamed motor made stairs (`stairs`); none where nothing tells that it was streamed."""
+    motor = _bench_of(recording).get("motor")
+    if not isinstance(motor, dict) or motor.get("driver") not in STREAMED:
+        return []
     told = np.interp(time_s, recording.motor.time_s - delays_of(recording).position_s, recording.motor.command_mm)
-    spans = stairs(time_s, position_mm, told, *force)
+    spans = stairs(time_s, told, *force)
     if spans:
         lasts_s, rate_Hz = sum(end - begin for begin, end in spans), 1.0 / float(np.median(np.diff(time_s)))
         notes.append(
@@ -138,15 +142,20 @@ def _stairs(
 
 def delays_of(recording: Recording) -> Delays:
     """The `timing` block of the bench file inside the recording; zero where there is none."""
-    text = recording.attachments.get(BENCH_FILE)
-    if text is None:
-        return Delays()
-    path = Path(f"{recording.source}:{BENCH_FILE}")
-    data = yamlfile.parse(text.decode(errors="replace"), path).data
-    timing = data.get("timing") if isinstance(data, dict) else None
+    timing = _bench_of(recording).get("timing")
     if not isinstance(timing, dict):
         return Delays()
+    path = Path(f"{recording.source}:{BENCH_FILE}")
     return Delays(_seconds(timing, "force_delay", path), _seconds(timing, "position_delay", path))
+
+
+def _bench_of(recording: Recording) -> dict[Key, Any]:
+    """The bench file inside the recording, as it is; empty where there is none."""
+    text = recording.attachments.get(BENCH_FILE)
+    if text is None:
+        return {}
+    data = yamlfile.parse(text.decode(errors="replace"), Path(f"{recording.source}:{BENCH_FILE}")).data
+    return data if isinstance(data, dict) else {}
 
 
 def increasing(time_s: Array, values: Array) -> tuple[Array, Array]:

@@ -13,14 +13,18 @@ from bench.recording.types import Array
 RAREST_Hz = 400.0
 """Positions a second that make a motion: a position loop settles within some 2 ms."""
 
+STREAMED = ("orca",)
+"""Drivers of motors that are told a position each time, in a bench file's words."""
+
 Spans = list[tuple[float, float]]
 
 
-def stairs(time_s: Array, position_mm: Array, command_mm: Array, force_time_s: Array, force_N: Array) -> Spans:
-    """Spans of time (from, to; s) in which a streamed motion is known too little for what the force is known to.
+def stairs(time_s: Array, command_mm: Array, force_time_s: Array, force_N: Array) -> Spans:
+    """Spans of time (from, to; s) in which a streamed motion is known too little for what the force is known to; none
+    where the motor was told often enough.
 
-    `time_s`, `position_mm`, `command_mm` (n,): the motor's samples, and where it was told to go with each; NaN where
-    nothing was told. `force_time_s`, `force_N` (m,). None where the motor was told often enough.
+    `time_s`, `command_mm` (n,): the motor's samples, and where it was told to go with each; NaN where nothing was told.
+    `force_time_s`, `force_N` (m,).
     """
     period_s = float(np.median(np.diff(time_s)))
     if len(force_N) < 3 or period_s * RAREST_Hz <= 1.0 or np.isfinite(command_mm).mean() < 0.5:
