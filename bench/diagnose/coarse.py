@@ -23,6 +23,7 @@ AMID = 0.01  # chance of so many equal pairs amid those that differ by a step or
 WINDOW, FEWEST = 50, 8  # samples looked at together, and the fewest such windows that tell of the noise
 PASSED = 1.5  # steps that the force moves there at the least
 HIDDEN = 0.4  # steps: less noise does not show at rest
+MANY = 4.0  # steps that changes scatter by, from which the median tells it well
 FINEST = 0.6  # steps that a change scatters by at the least: of rounding alone
 
 
@@ -123,7 +124,9 @@ def _in_excess(change: Array) -> _Excess | None:
     more = float(np.count_nonzero(change == 0)) - foretold
     std = float(np.sqrt(foretold + foretold**2 * inverse[0, 0]))
     sure = told == 4 and fall <= WIDEST and more >= max(MORE * foretold, SURELY * std)
-    scatter = max(float(np.sqrt(0.5 / max(-slope, 1e-6))), FINEST)
+    scatter, usual = float(np.sqrt(0.5 / max(-slope, 1e-6))), 1.4826 * float(np.median(change))
+    # where they scatter by many steps their numbers hardly go down within four, and tell of it by chance
+    scatter = max(min(scatter, usual) if usual > MANY else scatter, FINEST)
     return _Excess(more / len(change), std / len(change) if fall < WIDE else np.inf, scatter, sure)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from bench.diagnose import diagnose
 from bench.diagnose.channel import faults, standing_off
-from bench.diagnose.coarse import noise_steps, rounded
+from bench.diagnose.coarse import coarse_repeats, noise_steps, rounded
 from bench.diagnose.pulses import pulses
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
@@ -43,6 +43,16 @@ def test_a_value_that_stands_in_a_hold_neither_sticks_nor_stands_off(steps):
         assert not found.stuck.any() and not found.outlier.any()
         assert not standing_off(said - force, every, ~every, STEP_N).any()
         assert not pulses(said - force, every, STEP_N).any()
+
+
+def test_a_channel_whose_noise_is_many_steps_does_not_stick():
+    """A cell's millinewtons under noise of ten: changes of one to four steps are as many as each other but for chance,
+    which tells nothing of how far they scatter."""
+    time_s = np.arange(18000) / 549.0
+    force = 4.0 * np.abs(np.sin(0.4 * time_s)) * (time_s > 3.0)
+    none = np.zeros(len(force), dtype=bool)
+    noise = (0.01 * np.random.default_rng(seed).standard_normal(len(force)) for seed in range(1000))
+    assert not any(coarse_repeats(np.round(force + n, 3), none)[0].any() for n in noise)
 
 
 def test_a_channel_that_stays_for_moves_and_catches_up_has_stuck():
