@@ -74,6 +74,11 @@ class Data:
         return Grid(self.time_s)
 
     @cached_property
+    def speed_mm_s(self) -> Array:
+        """Of the motion (n,)."""
+        return np.asarray(np.gradient(self.position_mm, self.time_s))
+
+    @cached_property
     def scale(self) -> Array:
         """√w/σ (n,)."""
         return np.asarray(np.sqrt(self.weight) / self.sigma_N)
@@ -158,6 +163,7 @@ class Prepared:
     sample_s: float
     doubt_mm: float
     zero_N: float
+    stamp_s: float
     depth_mm: float
     force_scale_N: float
     pressed: bool
@@ -340,6 +346,7 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
         sample_s=sample_s,
         doubt_mm=m.surface_std_mm,
         zero_N=m.zero_std_N,
+        stamp_s=m.stamp_std_s,
         depth_mm=depth,
         force_scale_N=max(float(np.abs(m.force_N[counted]).max()), 1e-6),
         pressed=pressed,

@@ -116,7 +116,8 @@ def believed_structure(model: Model, prepared: Prepared) -> Structure:
         causes.append(cause_of(active.effect, active.form, active.values))
     past_N = prepared.force_scale_N if prepared.pressed else 0.0
     run_s = float(np.ptp(prepared.full.time_s))
-    return Structure(pad, tuple(causes), prepared.doubt_mm, prepared.zero_N, past_N, run_s)
+    doubts = prepared.doubt_mm, prepared.zero_N, past_N
+    return Structure(pad, tuple(causes), *doubts, run_s, prepared.stamp_s)
 
 
 def _pads(m: Measurement, believed: Model, structure: Structure, good: Mask) -> list[Array]:

@@ -174,11 +174,12 @@ def _coordinate(p: Parameter) -> Coordinate:
 
 @dataclass(frozen=True)
 class Structure:
-    """A pad with effects, to be fitted: x = [pad, effects in order, past, surface, zero].
+    """A pad with effects, to be fitted: x = [pad, effects in order, past, surface, stamps, zero].
 
     `doubt_mm`, `zero_N`: standard deviations of the surface and of the force's zero, as touch-off and tare found them;
     0: certain, and no entry of x. `past_N`: that of what each of the pad's modes begins with, where the run of `run_s`
-    begins in contact (`sim.pad.Past`); 0: it begins at rest.
+    begins in contact (`sim.pad.Past`); 0: it begins at rest. `stamp_s`: that of when positions were measured, all
+    together, where a motor is polled; 0: as their stamps say.
     """
 
     pad: PadNumbers
@@ -187,6 +188,7 @@ class Structure:
     zero_N: float = 0.0
     past_N: float = 0.0
     run_s: float = math.inf
+    stamp_s: float = 0.0
     coordinates: tuple[Coordinate, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -194,6 +196,8 @@ class Structure:
         found += [Coordinate("past", -6.0, 6.0, unit=self.past_N, cost=1.0)] * self.modes_begun
         if self.doubt_mm > 0:
             found.append(Coordinate("surface", -6.0, 6.0, unit=self.doubt_mm, cost=1.0))
+        if self.stamp_s > 0:
+            found.append(Coordinate("stamps", -6.0, 6.0, unit=self.stamp_s, cost=1.0))
         if self.zero_N > 0:
             found.append(Coordinate("zero", -4.0, 4.0, unit=self.zero_N, cost=1.0))
         object.__setattr__(self, "coordinates", tuple(found))
@@ -216,7 +220,7 @@ class Structure:
     @property
     def tail(self) -> int:
         """How many entries at the end of x belong to the run, and not to pad or causes."""
-        return self.modes_begun + (self.doubt_mm > 0) + (self.zero_N > 0)
+        return self.modes_begun + (self.doubt_mm > 0) + (self.stamp_s > 0) + (self.zero_N > 0)
 
     @property
     def modes_begun(self) -> int:
@@ -260,6 +264,11 @@ class Structure:
     def surface_mm(self, x: Array) -> float:
         """Depth added to all positions."""
         return float(x[len(x) - self.tail + self.modes_begun]) * self.doubt_mm if self.doubt_mm > 0 else 0.0
+
+    def late_s(self, x: Array) -> float:
+        """By how much positions were measured later than their stamps say."""
+        at = len(x) - 1 - (self.zero_N > 0)
+        return float(x[at]) * self.stamp_s if self.stamp_s > 0 else 0.0
 
     def offset_N(self, x: Array) -> float:
         """What the force reads without load."""

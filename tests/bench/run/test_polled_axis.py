@@ -6,9 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
 from bench import identify
+from bench.config import load_model
+from bench.diagnose import diagnose
 from bench.recording import Measurement
+from bench.shipped import find_file
 from tests.bench.run.benches import SHORT, Done, run
 
 TRUE = {"m": 2.24, "b": 0.69, "c_1": 0.25, "c_2": 0.15, "nu_1": 4.0, "nu_2": 0.35}
@@ -66,3 +70,23 @@ def test_a_streamed_motor_needs_none_of_it(tmp_path):
     measurement = done.recording.measurement()
     assert measurement.position_time_s.size == done.recording.motor.time_s.size
     assert not measurement.doubtful and measurement.stamp_std_s == 0
+
+
+def test_a_flawless_pad_gets_no_cause(quick):
+    """What the stamps' doubt makes of fast moves looks like a pad that is damped, or a force that is late."""
+    m = quick.recording.measurement()
+    assert m.stamp_std_s > 0.0
+    said = diagnose(m, load_model("polyurethane"))
+    assert said.verdict == "consistent" and not said.causes
+
+
+@pytest.mark.long
+def test_a_late_force_is_found_beyond_the_doubt_of_the_stamps(tmp_path):
+    pad = yaml.safe_load(find_file("pad", "polyurethane").read_text("utf-8"))
+    (tmp_path / "late.yaml").write_text(yaml.safe_dump(pad | {"effects": [{"id": "force_delay", "delay": 0.005}]}))
+    simulation = {"seed": 1, "pad": str(tmp_path / "late.yaml")}
+    m = run(tmp_path, "quick", "simulated_iai", simulation=simulation).recording.measurement()
+    (cause,) = diagnose(m, load_model("polyurethane")).causes
+    delay = cause.parameters["delay"]
+    assert cause.id == "force_delay"
+    assert abs(delay.value - 0.005) < 3.0 * delay.std and m.stamp_std_s < delay.std < 2.0 * m.stamp_std_s
