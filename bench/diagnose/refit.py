@@ -71,7 +71,7 @@ def force_at(data: Data, structure: Structure, x: Array) -> Array:
     """Simulated force on the grid (n,), N; not finite where the numbers make no plant."""
     data.work.add(data.size)
     position = data.position_mm + structure.surface_mm(x)
-    if late_s := structure.late_s(x):
+    if late_s := structure.late_s(x):  # far less than a move takes: to first order
         position = position - late_s * data.speed_mm_s
     with np.errstate(all="ignore"):
         force = structure.cascade(x).simulate_on(data.grid, position)
