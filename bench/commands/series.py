@@ -96,7 +96,7 @@ def _ask(question: str, answers: tuple[Answer, ...]) -> Answer:
     keys = ", ".join(_KEYS[answer] for answer in answers)
     known = {("" if answer == "go" else _KEYS[answer][0]): answer for answer in answers}
     while True:
-        word = asked(f"{question} ({keys}):").lower()[:1]
+        word = asked(f"{question} ({keys}):", ", or say --yes" if "go" in answers else "").lower()[:1]
         if word in known:
             return known[word]
 

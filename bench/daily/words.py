@@ -71,8 +71,9 @@ def plain(value: Any) -> Any:
     return value if value is None or isinstance(value, bool | int | str) else str(value)
 
 
-def asked(question: str) -> str:
-    """What the person answers on standard input, stripped; raises `Refused` where nobody can.
+def asked(question: str, otherwise: str = "") -> str:
+    """What the person answers on standard input, stripped; raises `Refused` where nobody can, which says what would do
+    `otherwise`.
 
     The question goes to standard error: with `--json -` nothing else may be on standard output.
     """
@@ -84,7 +85,7 @@ def asked(question: str) -> str:
         raise
     if not line:
         print(file=sys.stderr)
-        raise Refused("nobody answers: standard input has ended\n  answer at a terminal, or say --yes")
+        raise Refused(f"nobody answers: standard input has ended\n  answer at a terminal{otherwise}")
     return line.strip()
 
 
@@ -97,7 +98,7 @@ def agreed(question: str, *, yes: bool, must_say: bool = False) -> bool:
         return True
     known = {"y": True, "yes": True, "n": False, "no": False, **({} if must_say else {"": False})}
     while True:
-        answer = asked(f"{question} [y/n]" if must_say else f"{question} [y/N]").lower()
+        answer = asked(f"{question} [y/n]" if must_say else f"{question} [y/N]", ", or say --yes").lower()
         if answer in known:
             return known[answer]
 
