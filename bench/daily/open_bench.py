@@ -54,7 +54,7 @@ class OpenBench:
         limits = bench.limits
         self.notebook = Notebook()
         self.operator = Operator()
-        self.axis = Axis(self.rig.motor, 1.0 / motor_rate_Hz(bench))
+        self.axis = Axis(self.rig.motor, 1.0 / motor_rate_Hz(bench), bench.limits.following_error)
         protocol = _standing(bench)
         planned = plan(protocol, bench)
         monitor = Monitor(envelope_of(bench, planned))

@@ -31,6 +31,9 @@ SEGMENT_MM = 0.1
 REPLIES, SLOWER = 25, 1.03
 """So many replies tell how often a motor answers, in times of what was planned."""
 
+AT_ONCE = 0.7
+"""Of the following error that is allowed: from one position to the next."""
+
 
 class Curve(Protocol):
     """A planned motion: positions in mm, motor frame, `t` in seconds from its start."""
@@ -110,12 +113,16 @@ class Shifted:
 class Axis:
     """Feeds one motor and collects its samples; nothing here blocks.
 
-    `period_s` is the time between commands (stream) or polls (move).
+    `period_s` is the time between commands (stream) or polls (move). `following_mm`: how far the axis may be from where
+    it was told to be; a motor that takes longer to answer than planned is told no more than a part of that at once.
     """
 
-    def __init__(self, motor: Motor, period_s: float) -> None:
+    def __init__(self, motor: Motor, period_s: float, following_mm: float = math.inf) -> None:
         self.motor = motor
         self.period_s = period_s
+        self._most_mm = AT_ONCE * following_mm
+        self._slower = False
+        self._told_mm = math.nan
         self.clock = motor.link.clock
         self.live = False
         self.overruns = 0
@@ -292,7 +299,8 @@ class Axis:
             self._next_s = now_s + self.period_s
             return
         if self.motor.kind == "stream":
-            target = self.command(now_s)
+            target = self._next_mm(now_s) if self._slower else self.command(now_s)
+            self._told_mm = target
             self._waiting.append((self.motor.link.submit(self.motor.stream(target)), target))
         else:
             self._waiting.append((self.motor.link.submit(self.motor.read()), math.nan))
@@ -302,6 +310,17 @@ class Axis:
             self._next_s = now_s + self.period_s
         else:
             self._next_s += self.period_s
+
+    def _next_mm(self, now_s: float) -> float:
+        """Where a motor is to go next that is slower than planned: the plan was for a period in which it does not go so
+        far from where it was told to go before."""
+        for _ in range(4):
+            target = self.command(now_s)
+            way_mm = abs(target - self._told_mm)
+            if not way_mm > self._most_mm:
+                break
+            self._put_off(self.period_s * (1.0 - self._most_mm / way_mm))
+        return self.command(now_s)
 
     def _put_off(self, seconds: float) -> None:
         """Let a streamed profile go on where it was, so much later: a set-point that jumps is a blow to the pad."""
@@ -317,7 +336,7 @@ class Axis:
             return
         apart_s = median(b - a for a, b in pairwise(self._replies_s))  # one command waits: that is a whole exchange
         if apart_s > SLOWER * self.period_s:
-            self.period_s = apart_s
+            self.period_s, self._slower = apart_s, True
             self._replies_s.clear()
             self.told.append((now_s, "motor_slower", {"period_s": apart_s}))
 

@@ -123,7 +123,8 @@ def run_protocol(
                 recorder.event(rig.clock.now(), "left_behind", {**found, **known})
             monitor = Monitor(envelope_of(bench, plan))
             monitor.frozen.expect(force_Hz, bench.limits.stale)
-            loop = Loop(rig, Axis(rig.motor, 1.0 / motor_Hz), monitor, recorder, operator)
+            axis = Axis(rig.motor, 1.0 / motor_Hz, bench.limits.following_error)
+            loop = Loop(rig, axis, monitor, recorder, operator)
             if rig.world is not None:
                 from bench.run.simulated import overheard
 

@@ -62,6 +62,23 @@ def test_a_motor_that_is_slower_than_the_bench_file_knows_is_told_as_often_as_it
     assert done.outcome.held_up_s == float(done.result["held_up_s"]) < 0.1
 
 
+def test_a_motor_far_slower_than_planned_is_held_up_rather_than_left_behind(tmp_path: Any) -> None:
+    """As behind an adapter that hands over what has come every 16 ms: in that time a move of 40 mm/s goes 0.64 mm."""
+
+    def longer(world: Any, bench_s: float) -> None:
+        world.endpoints["motor"].device.delay_s = 0.016
+
+    slow = once(lambda bench_s, label: bench_s > 0.1, longer)
+    far = AIR | {"steps": [{"to": -4.0, "speed": 40, "hold": 0.5}, {"to": 0.0, "speed": 40, "hold": 0.5}]}
+    done = run(tmp_path, far, hook=slow, motor={"baudrate": 1_000_000})
+    assert done.outcome.cause is None
+    for asked, made in speeds_mm_s(done):
+        assert asked == 40.0 and made == pytest.approx(0.7 * 0.5 / done.outcome.motor_period_s, rel=0.15)
+    assert done.outcome.held_up_s > 0.01
+    motor = done.recording.motor
+    assert np.nanmax(np.abs(motor.command_mm - motor.position_mm)) < 0.5
+
+
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3, 4))])
 def test_what_is_felt_amid_stairs_costs_nothing_and_the_pad_is_found(tmp_path: Any, seed: int) -> None:
     done = run(tmp_path, "quick", motor={"baudrate": 115200}, simulation={"seed": seed})
