@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Literal
 
 from bench.config import Bench
-from bench.recording.stairs import STREAMED, RAREST_Hz
+from drivers.motor import STREAMED, RAREST_Hz
 from drivers.orca import DEFAULT_BAUDRATE, default_gap_s
 from drivers.regmap import MotorMap, WriteBlock, load_map
 

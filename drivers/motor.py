@@ -13,6 +13,12 @@ from drivers.wire import Exchange, Link, Steps
 
 SafeState = Literal["release", "hold", "retract"]
 
+STREAMED = ("orca",)
+"""Drivers of kind "stream", in a bench file's words: known before a device is opened, and from a recording."""
+
+RAREST_Hz = 400.0
+"""Positions a second that make a motion of a stream: a position loop settles within some 2 ms, and stands between."""
+
 
 @dataclass(frozen=True, slots=True)
 class MotorIdentity:

@@ -33,8 +33,8 @@ def main(args: argparse.Namespace) -> int:
     from bench.export import c_header, describe
     from bench.shipped import find_file
 
-    model = load_model(args.model)
-    source = find_file("pad", args.model).name
+    path = find_file("pad", args.model)
+    model, source = load_model(path), path.name
     if args.to == "c":
         text = c_header(model, args.rate, name=args.name, source=source, pad_only=args.pad_only)
     else:

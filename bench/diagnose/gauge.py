@@ -13,7 +13,7 @@ from sim.pad import Cascade, Pad
 from sim.relaxation import Relaxation
 
 from .data import Data
-from .numbers import Cause, cause_of
+from .numbers import Cause, Structure, cause_of
 from .refit import Fit
 
 Array = NDArray[np.float64]
@@ -36,8 +36,7 @@ def gauged(data: Data, fit: Fit) -> Fit:
         travel = _counting_mm(data, depth_mm, cause_of(cause.effect, cause.effect.forms[0]))
         if not 0.0 < counts < np.inf or not travel > 0.0:
             continue
-        at = structure.of_cause(index).start + [p.name for p in cause.fitted].index("rate")
-        x[at] *= values[GAUGE] * counts / travel
+        x[_rate_at(structure, index)] *= values[GAUGE] * counts / travel
         structure = structure.with_cause_at(index, cause.with_start(**{GAUGE: travel / counts}))
     return replace(fit, structure=structure, x=x)
 
@@ -53,7 +52,7 @@ def in_the_mean(data: Data, fit: Fit, covariance: Array) -> Array:
         if GAUGE not in values:
             continue
         at = structure.of_cause(index)
-        rate = at.start + [p.name for p in cause.fitted].index("rate")
+        rate = _rate_at(structure, index)
         for k in range(at.start, at.stop):
             if k == rate or not structure.lower[k] + STEP < x[k] < structure.upper[k] - STEP:
                 continue
@@ -65,6 +64,11 @@ def in_the_mean(data: Data, fit: Fit, covariance: Array) -> Array:
                 counts.append(_counting_mm(data, depth_mm, cause.with_start(**moved)))
             stated[rate, k] = x[rate] * (counts[1] - counts[0]) / (2.0 * STEP * max(sum(counts) / 2.0, 1e-300))
     return np.asarray(stated @ covariance @ stated.T)
+
+
+def _rate_at(structure: Structure, index: int) -> int:
+    """Where in x the rate of a cause stands."""
+    return int(structure.of_cause(index).start) + [p.name for p in structure.causes[index].fitted].index("rate")
 
 
 def _counting_mm(data: Data, depth_mm: Array, cause: Cause) -> float:

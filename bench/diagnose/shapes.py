@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.effects import Form
-from sim.effects.base import Parameter
 
 from .candidates import CHANNEL
 from .data import Data
@@ -160,13 +159,13 @@ def _usual(short: Data, members: Sequence[Member], best: int) -> int:
     if len(tied) == 1 or cause.of_the_law:  # whose numbers are each form's own
         return best
 
-    def number(member: Member, p: Parameter) -> float:
-        if not member.variances.get(p.name, 0.0) > 0.0:
-            return np.nan
-        value = member.values[p.name]
-        return float(np.log(value)) if p.logarithmic else value / max(abs(members[best].values[p.name]), 1e-300)
-
-    numbers = np.array([[number(m, p) for p in asked] for m in members])
+    scale = members[best].values
+    numbers = np.full((len(members), len(asked)), np.nan)
+    for row, member in zip(numbers, members, strict=True):
+        values, variances = member.values, member.variances
+        for n, p in enumerate(asked):
+            if variances.get(p.name, 0.0) > 0.0:
+                row[n] = np.log(values[p.name]) if p.logarithmic else values[p.name] / max(abs(scale[p.name]), 1e-300)
     tied = [k for k in tied if np.isfinite(numbers[k]).all()]
     if not tied:
         return best

@@ -155,7 +155,7 @@ def between_polls(
     values = np.concatenate([position_mm[kept], *(part.position_mm for part in drawn)])
     # The first polls of a move are the last ones of the move before it.
     stamps, order = np.unique(stamps, return_index=True)
-    force_noise_N = _white(force_N) if force_N.size > 2 else 0.0
+    force_noise_N = white(force_N) if force_N.size > 2 else 0.0
     doubtful = [span for part in drawn for span in _doubtful(part, stamp_std_s, force_time_s, force_N, force_noise_N)]
     together_s = float(np.hypot(stamp_std_s, _together_s(drawn, force_time_s, force_N)))
     notes = _notes(len(drawn), way, together_s, time_s, doubtful)
@@ -316,10 +316,10 @@ def _noise_of(position_mm: Array) -> Noise:
     steps = np.diff(values)
     steps = steps[steps > 1e-6]
     count = float(steps.min()) if steps.size and values.size < 0.5 * position_mm.size else 0.0
-    return Noise(count, _white(position_mm))
+    return Noise(count, white(position_mm))
 
 
-def _white(values: Array) -> float:
+def white(values: Array) -> float:
     """Standard deviation of white noise on something smooth, by its second differences."""
     second: NDArray[np.float64] = np.diff(values, 2)
     return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0))

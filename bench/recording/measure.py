@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from bench import yamlfile
 from bench.errors import InputError
 from bench.places import Key
-from bench.recording.between import between_polls
+from bench.recording.between import Spans, between_polls
 from bench.recording.schemas import BENCH_FILE, NO_SURFACE, STOPPED
-from bench.recording.stairs import STREAMED, Spans, stairs
+from bench.recording.stairs import stairs
 from bench.recording.types import Array, Event, Measurement, Recording
+from drivers.motor import STREAMED
 
 GAP = 5.0
 """A pause between samples of more than so many usual periods is reported."""
@@ -68,7 +69,8 @@ def measurement_of(recording: Recording) -> Measurement:
     notes = list(recording.notes)
     if recording.run and recording.result is None:
         notes.append(f"this run did not come to its end: it is there to {float(recording.load_cell.time_s[-1]):.4g} s")
-    delays = delays_of(recording)
+    bench = _bench_of(recording)
+    delays = _delays(bench, recording)
     if delays != Delays():
         notes.append(
             f"stamps corrected by the bench's timing: force {delays.force_s * 1e3:g} ms, "
@@ -105,7 +107,8 @@ def measurement_of(recording: Recording) -> Measurement:
         stamp_std = between.stamp_std_s
         notes += between.notes
     else:
-        doubtful = _stairs(recording, position_time, (force_time, force), notes)
+        told = np.interp(position_time, recording.motor.time_s - delays.position_s, recording.motor.command_mm)
+        doubtful = _stairs(bench, position_time, told, (force_time, force), notes)
     return Measurement(
         name=_name(recording.source),
         position_time_s=position_time,
@@ -124,13 +127,14 @@ def measurement_of(recording: Recording) -> Measurement:
     )
 
 
-def _stairs(recording: Recording, time_s: Array, force: tuple[Array, Array], notes: list[str]) -> Spans:
+def _stairs(
+    bench: dict[Key, Any], time_s: Array, told_mm: Array, force: tuple[Array, Array], notes: list[str]
+) -> Spans:
     """Where a streamed motor made stairs (`stairs`); none where nothing tells that it was streamed."""
-    motor = _bench_of(recording).get("motor")
+    motor = bench.get("motor")
     if not isinstance(motor, dict) or motor.get("driver") not in STREAMED:
         return []
-    told = np.interp(time_s, recording.motor.time_s - delays_of(recording).position_s, recording.motor.command_mm)
-    spans = stairs(time_s, told, *force)
+    spans = stairs(time_s, told_mm, *force)
     if spans:
         lasts_s, rate_Hz = sum(end - begin for begin, end in spans), 1.0 / float(np.median(np.diff(time_s)))
         notes.append(
@@ -142,7 +146,11 @@ def _stairs(recording: Recording, time_s: Array, force: tuple[Array, Array], not
 
 def delays_of(recording: Recording) -> Delays:
     """The `timing` block of the bench file inside the recording; zero where there is none."""
-    timing = _bench_of(recording).get("timing")
+    return _delays(_bench_of(recording), recording)
+
+
+def _delays(bench: dict[Key, Any], recording: Recording) -> Delays:
+    timing = bench.get("timing")
     if not isinstance(timing, dict):
         return Delays()
     path = Path(f"{recording.source}:{BENCH_FILE}")

@@ -8,15 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from bench.recording.between import Spans, white
 from bench.recording.types import Array
-
-RAREST_Hz = 400.0
-"""Positions a second that make a motion: a position loop settles within some 2 ms."""
-
-STREAMED = ("orca",)
-"""Drivers of motors that are told a position each time, in a bench file's words."""
-
-Spans = list[tuple[float, float]]
+from drivers.motor import RAREST_Hz
 
 
 def stairs(time_s: Array, command_mm: Array, force_time_s: Array, force_N: Array) -> Spans:
@@ -29,10 +23,9 @@ def stairs(time_s: Array, command_mm: Array, force_time_s: Array, force_N: Array
     period_s = float(np.median(np.diff(time_s)))
     if len(force_N) < 3 or period_s * RAREST_Hz <= 1.0 or np.isfinite(command_mm).mean() < 0.5:
         return []
-    noise_N = float(np.median(np.abs(np.diff(force_N, 2)))) / 0.6745 / np.sqrt(6.0)
     steps_N = np.abs(np.diff(np.interp(time_s, force_time_s, force_N)))
     told = np.abs(np.diff(np.nan_to_num(command_mm, nan=0.0))) > 0.0
-    unknown = np.flatnonzero(told & (0.5 * steps_N > noise_N))
+    unknown = np.flatnonzero(told & (0.5 * steps_N > white(force_N)))
     spans: Spans = []
     for k in unknown.tolist():
         begin_s, end_s = float(time_s[max(k - 1, 0)]), float(time_s[min(k + 2, len(time_s) - 1)])

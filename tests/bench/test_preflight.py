@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -385,3 +387,10 @@ def test_a_streamed_motor_that_hears_too_seldom(tmp_path: Path, speed: float, pa
     found = check(protocol(tmp_path, f"{{to: 2, speed: {speed}}}", head="limits: {force: 15}\n"), slow, model())
     assert (found.refusal() is None) == passes
     assert passes or "behind: limits.following_error is 0.5 mm" in refusal(found)
+
+
+def test_a_plan_needs_no_recordings_nor_what_reads_them() -> None:
+    code = "import sys, bench.preflight; print([m for m in ('scipy', 'mcap', 'bench.recording') if m in sys.modules])"
+    root = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, timeout=60)
+    assert done.stdout.strip() == "[]", done.stderr
