@@ -76,4 +76,4 @@ def _averaged(run: Run, owner: NDArray[np.intp]) -> Run:
     u = np.bincount(owner, share * run.u) / count
     with np.errstate(invalid="ignore"):
         y = np.where(weight > 0, np.bincount(owner, run.weight * run.y) / weight, 0.0)
-    return Run(time, np.diff(time, prepend=time[0]), u, y, weight, run.surface, run.past, run.stamp_std_s)
+    return Run(time, np.diff(time, prepend=time[0]), u, y, weight, run.surface, run.past, run.stamp_std_s, run.late)

@@ -14,6 +14,7 @@ from bench.recording.types import Measurement
 from . import asked, notes
 from .laws import Family
 from .noise import Noise, noise_of
+from .nuisance import doubtful, moved_mm, with_doubts
 from .parameters import model_dict, parameters
 from .past import with_pasts
 from .path import straightened
@@ -22,7 +23,6 @@ from .problem import Problem, build
 from .profile import not_told
 from .result import Evidence, FitResult
 from .select import Choice, choose
-from .surface import doubtful, moved_mm, with_surfaces
 from .traces import figures_of, traces_of
 from .uncertainty import spread_of
 from .unformed import with_points
@@ -97,7 +97,7 @@ def fit(
         noise=noise,
         independent_samples=spread.samples,
         covariance=covariance,
-        surface_moved_mm=moved_mm(problem, structure.family, structure.split(best.x)[0]),
+        surface_moved_mm=moved_mm(problem, structure.split(best.x)[0]),
     )
 
 
@@ -112,7 +112,7 @@ def _chosen(
     problem = with_pasts(doubtful(problem, noise.floor_N), noise)
     said = progress or (lambda _: None)
     given: Sequence[Family] = families or points(problem, contacts[0])
-    choice = choose(problem, [with_surfaces(f, problem) for f in given], orders, contacts, said)
+    choice = choose(problem, [with_doubts(f, problem) for f in given], orders, contacts, said)
     return problem, choice
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from sim.elastic import Exponential, Polynomial, Power
 
 from ._kernel import Array
+from .runs import Run
 
 Named = list[tuple[str, float, str]]
 
@@ -42,8 +43,8 @@ class Family:
             return {"law": self.name, "alpha": [0.0] + [value for _, value, _ in numbers]}
         return {"law": self.name} | {name: value for name, value, _ in numbers}
 
-    def of_run(self, u: Array, theta: Array, surface: int | None, slopes: bool = True) -> tuple[Array, Array]:
-        """`shape` for one run; `surface`: which doubtful surface is the run's (`surface.Movable`), None where certain.
+    def of_run(self, run: Run, dt_s: Array, u: Array, theta: Array, slopes: bool = True) -> tuple[Array, Array]:
+        """`shape` over samples of one run, which may be in doubt itself (`nuisance.Movable`).
 
         Without `slopes` the derivatives may be left out.
         """

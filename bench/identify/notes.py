@@ -14,9 +14,9 @@ from .clocks import clocks_note
 from .estimate import NOTHING, Estimate
 from .motion import glanced, holds, turns
 from .noise import Noise
+from .nuisance import late_s, moved_mm
 from .past import begins_loaded, fitted_past, said_of_past
 from .problem import Problem
-from .surface import moved_mm
 
 LAW, SHARES, RATES = "law", "shares", "rates"
 EVERYTHING = frozenset({LAW, SHARES, RATES})
@@ -215,7 +215,7 @@ def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
     if weights.sum() <= NOTHING:
         out.append("No positive stiffness fits these data: every parameter is lost.")
         return out
-    out += _surfaces(problem, estimate)
+    out += _doubts(problem, estimate)
     slow = [1 / nu for nu, a in zip(rates, weights[1:], strict=True) if a > 0 and 1 / nu > 0.5 * span]
     if slow:
         out.append(
@@ -239,13 +239,19 @@ def about_fit(problem: Problem, estimate: Estimate) -> list[str]:
     return out
 
 
-def _surfaces(problem: Problem, estimate: Estimate) -> list[str]:
-    """Where the surfaces that touch-off left in doubt were put."""
+def _doubts(problem: Problem, estimate: Estimate) -> list[str]:
+    """Where the surfaces that touch-off left in doubt were put, and the stamps of polled positions."""
     theta, _, _ = estimate.structure.split(estimate.x)
-    moved = moved_mm(problem, estimate.structure.family, theta)
-    return [
-        f"{m.name}: the surface was put {abs(1e3 * by):.1f} µm {'higher' if by > 0 else 'lower'} than touch-off said"
-        f" (its own doubt: {1e3 * m.surface_std_mm:.1f} µm)."
-        for m, by in zip(problem.measurements, moved, strict=True)
-        if by
-    ]
+    out = []
+    for m, by, late in zip(problem.measurements, moved_mm(problem, theta), late_s(problem, theta), strict=True):
+        if by:
+            out.append(
+                f"{m.name}: the surface was put {abs(1e3 * by):.1f} µm {'higher' if by > 0 else 'lower'} than touch-off"
+                f" said (its own doubt: {1e3 * m.surface_std_mm:.1f} µm)."
+            )
+        if abs(late) > 0.5 * m.stamp_std_s:
+            out.append(
+                f"{m.name}: positions were taken to be {abs(1e3 * late):.2g} ms {'later' if late > 0 else 'earlier'}"
+                f" than their stamps say (their own doubt: {1e3 * m.stamp_std_s:.2g} ms)."
+            )
+    return out

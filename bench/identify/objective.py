@@ -78,7 +78,7 @@ class Simulation:
     def over(self, dt_s: Array, u: Array, derivatives: bool = False) -> Piece:
         """The next n samples: time since the one before each, and depth over D."""
         structure, n = self.structure, len(u)
-        s, ds = structure.family.of_run(u, self._theta, self.run.surface, derivatives)
+        s, ds = structure.family.of_run(self.run, dt_s, u, self._theta, derivatives)
         if structure.pasts:
             ds = np.hstack([ds, np.zeros((n, structure.pasts * structure.order))])
         force, elastic, gone = np.empty(n), np.empty(n), np.empty(n, dtype=np.bool_)
@@ -100,7 +100,7 @@ def simulate(run: Run, structure: Structure, x: Array, derivatives: bool = False
 
 
 def cost(problem: Problem, structure: Structure, x: Array) -> float:
-    """Σ w e², force in units of the problem's scale, and what moved surfaces cost."""
+    """Σ w e², force in units of the problem's scale, and what the runs' own doubts cost."""
     total = float(prior_of(problem, structure) @ x**2)
     for run in problem.runs:
         for piece in simulate(run, structure, x):
@@ -109,7 +109,7 @@ def cost(problem: Problem, structure: Structure, x: Array) -> float:
 
 
 def normal_equations(problem: Problem, structure: Structure, x: Array) -> tuple[float, Array, Array]:
-    """Σ w e², Σ w e ∂F/∂x (P,), Σ w ∂F/∂x ∂F/∂xᵀ (P, P), each with the prior of the surfaces."""
+    """Σ w e², Σ w e ∂F/∂x (P,), Σ w ∂F/∂x ∂F/∂xᵀ (P, P), each with the prior of the runs' own doubts."""
     prior = prior_of(problem, structure)
     total, gradient, matrix = float(prior @ x**2), -prior * x, np.diag(prior)
     for run in problem.runs:
@@ -121,7 +121,7 @@ def normal_equations(problem: Problem, structure: Structure, x: Array) -> tuple[
 
 
 def prior_of(problem: Problem, structure: Structure) -> Array:
-    """What each x² costs, (P,): nothing but for moved surfaces, which are the last of θ."""
+    """What each x² costs, (P,): nothing but for the runs' own doubts, which are the last of θ."""
     out = np.zeros(structure.size)
     k, count = structure.family.size, len(problem.prior)
     out[k - count : k] = problem.prior

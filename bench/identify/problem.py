@@ -38,7 +38,8 @@ class Problem:
     """Of each run: where its force samples stand in the union grid; empty for a long run in blocks (`long`)."""
     notes: tuple[str, ...] = field(default=())
     prior: tuple[float, ...] = ()
-    """Of each doubtful surface: what its shift squared (units of D) costs, in the units of Σ w e²."""
+    """Of each doubtful surface what its shift squared (units of D) costs, and then of each run's doubtful stamps what
+    the square of their lateness (standard deviations) does, in the units of Σ w e²."""
     noise_square: float = 0.0
     """Variance of the force's noise, scaled; the prior was weighed by it."""
     rebuilt: bool = False

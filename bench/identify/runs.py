@@ -29,6 +29,8 @@ class Run:
     """Which of the problem's unknown pasts this run begins with; None: it begins at rest."""
     stamp_std_s: float = 0.0
     """By how much all its positions may be early or late against its forces, standard deviation."""
+    late: int | None = None
+    """Which of the problem's doubtful stamps are this run's; None: not estimated."""
 
     @property
     def size(self) -> int:

@@ -90,7 +90,7 @@ def gram(problem: Problem, family: Family, theta: Array, rates: Array, elastic: 
     M = len(rates)
     matrix, right, square = np.zeros((M + 1, M + 1)), np.zeros(M + 1), 0.0
     for j, run in enumerate(problem.runs):
-        s = elastic[j] if elastic is not None else family.of_run(run.u, theta, run.surface, False)[0]
+        s = elastic[j] if elastic is not None else family.of_run(run, run.dt_s, run.u, theta, False)[0]
         weight = keep[j] if keep is not None else run.weight
         H = _kernel.modes(run.dt_s, s, rates)
         weighted = H * weight[:, None]

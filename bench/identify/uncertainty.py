@@ -26,8 +26,8 @@ class Spread:
 
 
 def spread_of(problem: Problem, estimate: Estimate) -> Spread:
-    """Sandwich H⁻¹ S H⁻¹ (`sandwich`). The prior of a doubtful surface adds its own spread, and so do stamps of the
-    position that may all be off together. Variables at a bound have none.
+    """Sandwich H⁻¹ S H⁻¹ (`sandwich`). The prior of a run's doubts adds its own spread, and so do stamps of the
+    position that may all be off together and were taken as they are. Variables at a bound have none.
     """
     P = estimate.structure.size
     sensitivity, errors = _per_sample(problem, estimate)
@@ -139,13 +139,14 @@ def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list
 
 
 def _late(problem: Problem, estimate: Estimate) -> list[Array]:
-    """Of each run whose stamps are in doubt: Σ w J δF, (P,), δF what positions late by one of its deviations make.
+    """Of each run whose doubtful stamps were taken as they are: Σ w J δF, (P,), δF what positions late by one of its
+    deviations make.
 
     A model driven by motion that is late by τ is itself late: δF = −τ dF/dt, with the slope over the two steps beside.
     """
     out = []
     for run in problem.runs:
-        if run.stamp_std_s <= 0 or run.size < 3:
+        if run.stamp_std_s <= 0 or run.late is not None or run.size < 3:
             continue
         pieces = list(objective.simulate(run, estimate.structure, estimate.x, derivatives=True))
         force = np.concatenate([piece.force for piece in pieces])

@@ -9,11 +9,11 @@ import numpy as np
 
 from .condense import condensed
 from .estimate import polish, search
+from .nuisance import with_doubts
 from .points import Points, points
 from .problem import Problem
 from .select import CLEAR, Choice, choose, finer, judged
 from .starts import Starter
-from .surface import with_surfaces
 
 TINY = 1e-300
 CLEARLY = 20.0  # of the criterion, and units of χ² that a trial must gain
@@ -31,7 +31,7 @@ def with_points(problem: Problem, choice: Choice, orders: Sequence[int], progres
         return choice
     near = [r for r in orders if abs(r - structure.order) <= 1]
     progress("curves through points")
-    families = [with_surfaces(family, problem) for family in through]
+    families = [with_doubts(family, problem) for family in through]
     other = choose(problem, families, near, (structure.unilateral,), progress)
     lower = other if other.best.V < choice.best.V else choice
     rivals = [judged(c, lower.independent) for c in other.candidates]
@@ -51,7 +51,7 @@ def _gains(problem: Problem, choice: Choice, family: Points) -> bool:
     """Whether a curve through points gains on the best formula at all: on a shortened stand-in, then on a finer one."""
     best = choice.best.estimate
     short, _ = condensed(problem)
-    structure = replace(best.structure, family=with_surfaces(family, problem))
+    structure = replace(best.structure, family=with_doubts(family, problem))
     starts = Starter(short, structure.family, structure.unilateral, best.bounds).first(structure.order, 2)
     trial, formula = search(short, structure, starts, best.bounds), best
     for on in (short, finer(problem)):

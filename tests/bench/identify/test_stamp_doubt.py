@@ -1,4 +1,4 @@
-"""Stamps of the position that may all be off together are in the standard errors."""
+"""Stamps of the position that may all be off together: estimated with the pad, or in the standard errors."""
 
 from __future__ import annotations
 
@@ -8,6 +8,14 @@ import numpy as np
 import pytest
 
 from bench.identify import fit
+from bench.identify.estimate import polish, search
+from bench.identify.laws import exponential
+from bench.identify.objective import Structure
+from bench.identify.parameters import parameters
+from bench.identify.problem import build
+from bench.identify.result import Parameter
+from bench.identify.starts import Starter, bounds_of
+from bench.identify.uncertainty import spread_of
 from bench.recording.types import Measurement
 from tests.truth.laws import Exponential
 from tests.truth.motion import staircase
@@ -25,16 +33,53 @@ def measured(rng: np.random.Generator) -> Measurement:
     return Measurement("slow", t, motion.position(t), t, force)
 
 
+def taken_as_stamped(m: Measurement) -> dict[str, Parameter]:
+    """The numbers of a fit whose runs' own doubts are not estimated with them."""
+    problem, family = build([m]), exponential()
+    bounds = bounds_of(problem)
+    rough = search(problem, Structure(family, 2, True), Starter(problem, family, True, bounds).first(2), bounds)
+    best = polish(problem, rough)
+    return parameters(problem, best, spread_of(problem, best))[0]
+
+
 def test_standard_errors_grow_by_what_late_stamps_move_the_numbers() -> None:
     certain = measured(np.random.default_rng(7))
-    given: dict[str, object] = {"law": "exponential", "order": 2, "contact": "unilateral"}
-    base = fit(certain, **given).parameters  # type: ignore[arg-type]
-    doubtful = fit(replace(certain, stamp_std_s=LATE_S), **given).parameters  # type: ignore[arg-type]
-    late = replace(certain, position_time_s=certain.position_time_s + LATE_S)
-    moved = fit(late, **given).parameters  # type: ignore[arg-type]
+    base = taken_as_stamped(certain)
+    doubtful = taken_as_stamped(replace(certain, stamp_std_s=LATE_S))
+    moved = taken_as_stamped(replace(certain, position_time_s=certain.position_time_s + LATE_S))
     for name, one in base.items():
         assert doubtful[name].value == pytest.approx(one.value, rel=1e-9)
         added = np.sqrt(doubtful[name].std ** 2 - one.std**2)
         # What is far below the noise's own share is told by the stamps' no better than that.
         assert added == pytest.approx(abs(moved[name].value - one.value), rel=0.15, abs=0.15 * one.std)
     assert doubtful["c_1"].std > 1.5 * base["c_1"].std  # the doubt is no trifle here: else nothing was tested
+
+
+def test_doubtful_stamps_are_estimated_with_the_pad() -> None:
+    given: dict[str, object] = {"law": "exponential", "order": 2, "contact": "unilateral"}
+    deviations, taken_as_they_are = [], []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        m = measured(rng)
+        late_s = LATE_S * float(rng.standard_normal())
+        m = replace(m, position_time_s=m.position_time_s - late_s)  # measured later than stamped
+        found = fit(replace(m, stamp_std_s=LATE_S), **given)  # type: ignore[arg-type]
+        certain = fit(m, **given)  # type: ignore[arg-type]
+        for fitted, z in ((found, deviations), (certain, taken_as_they_are)):
+            share = fitted.parameters["c_1"]
+            z.append((share.value - 0.25) / share.std)
+        said = [note for note in found.notes if "than their stamps say" in note]
+        assert bool(said) == (abs(late_s) > 0.5 * LATE_S) or abs(abs(late_s) / LATE_S - 0.5) < 0.2
+        assert all((" later " if late_s > 0 else " earlier ") in note for note in said)
+    assert max(np.abs(deviations)) < 3.0
+    assert max(np.abs(taken_as_they_are)) > 5.0  # what was to be corrected
+
+
+def test_late_positions_buy_no_mode() -> None:
+    """The order is left to the choice: a late force is not taken for a pad that relaxes within a few samples."""
+    orders = []
+    for seed in range(4):
+        m = measured(np.random.default_rng(100 + seed))
+        m = replace(m, position_time_s=m.position_time_s + 2 * LATE_S, stamp_std_s=LATE_S)
+        orders.append(fit(m, law="exponential").order)
+    assert orders == [2, 2, 2, 2]
