@@ -11,18 +11,24 @@ said, and told to whoever fits.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.recording.giving_way import GivingWay, giving_way
+from bench.recording.giving_way import TIMES_S, GivingWay, giving_way
 from bench.recording.schemas import HALT, MOVE, POLLED
 from bench.recording.types import Array, Event
 from bench.trajectory import Profile
 
 LINE_MISSES_MM = 1e-3
 """A line between polls that misses the profile by less is as good as the profile."""
+
+COARSE_MM = 4e-3
+"""Steps of a count that are stairs where several polls are of one: they are off by more than `LINE_MISSES_MM`."""
+
+FEWEST, MOST = 4, 3000
+"""Polls that a start in time is found by."""
 
 FINE_MM = 2.5e-4
 """The samples added follow the profile to within so much."""
@@ -142,7 +148,7 @@ def between_polls(
         return None
     noise = _noise_of(position_mm)
     stamp_std_s = max((_number(e, "stamp_std_s") for e in events if e.name == POLLED), default=0.0)
-    every = (_among_polls(move, time_s, position_mm, noise.both_mm) for move in _moves(events, time_s, position_mm))
+    every = (_among_polls(move, time_s, position_mm, noise) for move in _moves(events, time_s, position_mm, noise))
     placed = [part for part in every if part is not None]
     if not placed:
         return None
@@ -165,7 +171,7 @@ def between_polls(
 # -- what was commanded ------------------------------------------------------------------------------------------
 
 
-def _moves(events: Sequence[Event], time_s: Array, position_mm: Array) -> list[Move]:
+def _moves(events: Sequence[Event], time_s: Array, position_mm: Array, noise: Noise) -> list[Move]:
     told = sorted((e for e in events if e.name == MOVE), key=_commanded_s)
     halts = [event.time_s for event in events if event.name == HALT]
     moves: list[Move] = []
@@ -173,15 +179,20 @@ def _moves(events: Sequence[Event], time_s: Array, position_mm: Array) -> list[M
     for i, event in enumerate(told):
         begin_s = _commanded_s(event)
         over_s = _commanded_s(told[i + 1]) if i + 1 < len(told) else np.inf
-        halted = any(begin_s <= halt_s < over_s for halt_s in halts)
+        halt_s = next((at for at in halts if begin_s <= at < over_s), None)
         start_mm = _stand_mm(time_s, position_mm, begin_s) if np.isnan(end_mm) else end_mm
-        target_mm = _stand_mm(time_s, position_mm, over_s) if halted else _number(event, "target_mm")
+        target_mm = _number(event, "target_mm")
         speed, acceleration = _number(event, "speed_mm_s"), _number(event, "acceleration_mm_s2")
-        end_mm = float("nan") if halted else target_mm
         if not (np.isfinite([start_mm, target_mm]).all() and speed > 0 and acceleration > 0):
+            end_mm = float("nan")
             continue
-        # One that is halted brakes as hard as it would have at its end: a trapezoid to where it came to stand.
-        moves.append(Move(begin_s, event.time_s, over_s, Profile(start_mm, target_mm, speed, acceleration)))
+        move = Move(begin_s, event.time_s, over_s, Profile(start_mm, target_mm, speed, acceleration))
+        if halt_s is not None:
+            # It brakes as hard as it would have at its end: a trapezoid to where it came to stand.
+            target_mm = _halted_mm(move, halt_s + 0.5 * _number(event, "waited_s"), time_s, position_mm, noise)
+            move = replace(move, profile=Profile(start_mm, target_mm, speed, acceleration))
+        end_mm = target_mm
+        moves.append(move)
     return moves
 
 
@@ -200,11 +211,24 @@ def _stand_mm(time_s: Array, position_mm: Array, until_s: float) -> float:
     return float(np.mean(position_mm[max(end - 2, 0) : end])) if end else float("nan")
 
 
+def _halted_mm(move: Move, halted_s: float, time_s: Array, position_mm: Array, noise: Noise) -> float:
+    """Where a move that was halted about then came to stand: as the polls have it, and within their count as its
+    profile does, which they tell while it moves."""
+    stand_mm = _stand_mm(time_s, position_mm, move.over_s)
+    moving = slice(int(np.searchsorted(time_s, move.earliest_s)), int(np.searchsorted(time_s, halted_s)))
+    if moving.stop - moving.start < FEWEST:
+        return stand_mm
+    start_s, _ = _start_of(move, time_s[moving], position_mm[moving], noise.both_mm)
+    reached_mm = float(move.profile.position(halted_s - start_s))
+    return float(np.clip(reached_mm, stand_mm - 0.5 * noise.count_mm, stand_mm + 0.5 * noise.count_mm))
+
+
 # -- one move ----------------------------------------------------------------------------------------------------
 
 
-def _among_polls(move: Move, time_s: Array, position_mm: Array, noise_mm: float) -> Placed | None:
-    """The polls of a move, from two before its command until its servo has settled; None where they need no help."""
+def _among_polls(move: Move, time_s: Array, position_mm: Array, noise: Noise) -> Placed | None:
+    """The polls of a move, from two before its command until its servo has settled; None where they need no help: where
+    lines between them are as good as the profile, and no stairs of the device's count."""
     profile = move.profile
     first = int(np.searchsorted(time_s, move.earliest_s)) - 2
     last = int(np.searchsorted(time_s, min(move.over_s, move.latest_s + profile.duration_s)))
@@ -212,9 +236,14 @@ def _among_polls(move: Move, time_s: Array, position_mm: Array, noise_mm: float)
         return None
     period_s = float(np.median(np.diff(time_s[first : last + 1])))
     line_misses_mm = profile.peak_acceleration_mm_s2 * period_s**2 / 8.0
-    if line_misses_mm < max(noise_mm, LINE_MISSES_MM) or abs(profile.end_mm - profile.start_mm) < SMALL * noise_mm:
+    stairs = noise.count_mm > COARSE_MM and profile.peak_speed_mm_s * period_s < noise.count_mm
+    if line_misses_mm < max(noise.both_mm, LINE_MISSES_MM) and not stairs:
+        return None
+    if abs(profile.end_mm - profile.start_mm) < SMALL * noise.both_mm:
         return None
     settled_s = min(move.over_s, move.latest_s + profile.duration_s + max(SETTLE_S, TAIL_PERIODS * period_s))
+    if abs(_stand_mm(time_s, position_mm, move.over_s) - profile.end_mm) > LINE_MISSES_MM:
+        settled_s = move.over_s  # halted between two counts, it stands there
     window = slice(first, int(np.searchsorted(time_s, settled_s)))
     return Placed(move, time_s[window], position_mm[window])
 
@@ -240,7 +269,8 @@ def _place(placed: list[Placed], force_time_s: Array, force_N: Array, noise: Noi
 def _drawn(part: Placed, way: GivingWay | None, noise: Noise) -> Drawn:
     t = part.time_s
     corners = part.start_s + _corners(part.move.profile)
-    after = np.arange(corners[-1], t[-1], SERVO_S) if way is not None else np.zeros(0)
+    taken_up_s = min(float(t[-1]), float(corners[-1]) + max(SETTLE_S, float(TIMES_S[-1])))
+    after = np.arange(corners[-1], taken_up_s, SERVO_S) if way is not None else np.zeros(0)
     stamps = np.union1d(t, np.concatenate([corners, after]))
     stamps = stamps[(stamps >= t[0]) & (stamps <= t[-1])]
     given_mm, given_std_mm = (way.at, way.std_at) if way is not None else (np.zeros_like, np.zeros_like)
@@ -266,6 +296,8 @@ def _start_of(move: Move, time_s: Array, position_mm: Array, noise_mm: float) ->
     """When the device began, and the standard deviation of that: least squares over the polls, any start between
     command and reply being as likely as any other beforehand."""
     low, high = move.earliest_s, max(move.latest_s, move.earliest_s + 1e-6)
+    every = -(-time_s.size // MOST)
+    time_s, position_mm = time_s[::every], position_mm[::every]
     for _ in range(2):
         starts = np.linspace(low, high, STARTS)
         rest = position_mm - move.profile.position(time_s - starts[:, None])

@@ -141,6 +141,22 @@ def test_a_halted_move_ends_where_it_was_halted():
     assert np.abs(drawn).max() < 12
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_slow_move_halted_between_two_counts_stands_there(seed):
+    """Several polls are of one count; what they tell while it moves is finer than the count it stands on."""
+    way = 0.08 + 0.06 * np.random.default_rng(seed).uniform()
+    axis = Axis([0.0, way], seed, speed=0.2)
+    move, braked_s = axis.events[0], axis.begun[0] + way / 0.2
+    halted_s = braked_s - np.random.default_rng(seed + 50).uniform(0.0, REPLY_S)
+    axis.events = [Event(move.time_s, "move", {**move.data, "target_mm": 3.0}), Event(halted_s, "halt", {})]
+    recording = axis.recording()
+    t, drawn = errors_um(axis, recording.measurement())
+    # Half of what a halt waits, at 0.2 mm/s, is 1.7 µm; a count of 10 µm leaves an error of 2.9 µm, and 5 at most.
+    assert np.abs(drawn[t > 0.6]).max() < 2.3
+    polls = 1e3 * (np.interp(t, recording.motor.time_s, recording.motor.position_mm) - axis.at(t))
+    assert np.abs(polls[(t > 0.6) & (t < braked_s)]).max() > 4.0, "the premise: stairs of a count"
+
+
 def test_what_is_not_known_costs_nothing():
     """0.5 ms at 60 mm/s on 6 N/mm are 0.18 N: such samples do not count, those of holds and of slow motion do."""
     quick = Axis([0.0, 1.0, 2.0, 0.0], seed=3, stiffness=6.0).recording(stamp_std_s=5e-4, noise_N=0.01).measurement()
