@@ -91,7 +91,8 @@ def _cut(
     sample: float,
 ) -> NDArray[np.intp]:
     """The block of each sample; the first sample, a jump from rest, stays alone. `nodes` (n,): times of those without a
-    force, −1 for the others; a block of these may go so far `between` two forces, and takes less time than a `sample`.
+    force, −1 for the others; a block of these may go so far `between` two forces, and takes less time than a `sample`;
+    but where the speed changes: a force that is late, or a mass, answers to when that was.
     `piece` (n,): no block has samples of two."""
     n = travelled.shape[0]
     owner = np.zeros(n, dtype=np.int64)
@@ -109,7 +110,9 @@ def _cut(
             end += 1
         while (
             nodes[at] >= 0.0
+            and since[at] > 0
             and end < n
+            and since[end] > 0
             and nodes[end] >= 0.0
             and piece[end] == piece[at]
             and travelled[end] - travelled[at] <= between
