@@ -36,6 +36,9 @@ if TYPE_CHECKING:
 
 DIAGNOSIS = "diagnosis.json"
 
+WRONG = 1.5
+"""Times the noise, beyond which a fit's error is said to be no noise."""
+
 NO_PAD = {"pad": {"elastic": {"law": "none"}}}
 """The model of a bench in free air."""
 
@@ -120,6 +123,11 @@ def fit_lines(fit: FitResult) -> list[str]:
         verdict = "   undetermined by these data" if name in fit.undetermined else ""
         unit = f" {parameter.unit}" if parameter.unit != "1" else ""
         lines.append(f"  {name:<{width}} = {parameter.value:.5g}{doubt}{unit}{verdict}")
+    if fit.rmse > WRONG * fit.noise_floor > 0:
+        lines.append(
+            f"  the model leaves {fit.rmse / fit.noise_floor:.2g} times the noise: it lacks something, and its numbers "
+            "make up for that; their ± hold for the best such model and not for the pad"
+        )
     lines += [f"  note: {note}" for note in fit.notes]
     return lines
 

@@ -31,7 +31,7 @@ from .noiseless import without_noise
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
 from .refit import force_at
-from .remains import remains
+from .remains import FEWEST, beyond_chance, remains
 from .result import Alternative, Diagnosis
 from .search import A_PART, Search
 from .swing import Swing
@@ -47,6 +47,7 @@ Mask = NDArray[np.bool_]
 TOLD = 0.002  # of what the belief leaves beyond the noise: what a fault of the channel adds at the least
 NO_NOISE = 0.1  # of the noise power: what turns its sign with each sample is taken for some times as much noise
 ENDED_EARLY = "the search ended with its work done: what is left may have a further cause, for which it did not look"
+FEW_TO_TELL = "only {} force samples count in these data: too few to tell causes by"
 RIVALS = 4  # models of the best single causes that are kept
 
 
@@ -166,7 +167,8 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
     if causes:
         verdict = "explained" if explains(left, causes, not search.reach.rich) else "unexplained"
     else:
-        verdict = "unexplained" if told and speaks(excess[0], squares[0], floor) else "consistent"
+        something = (told and speaks(excess[0], squares[0], floor)) or beyond_chance(full, residual)
+        verdict = "unexplained" if something else "consistent"
     held_out_N = float(np.sqrt(squares[0] + apart)), float(np.sqrt(squares[-1]))
     floor = min(float(np.sqrt(prepared.floor_N**2 - prepared.felt_floor_N**2)), floor)
     saturated = flags.saturated.copy()
@@ -196,6 +198,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
             *prepared.said_of_noise,
             *_past(search),
             *([ENDED_EARLY] if path.cut_short else []),
+            *([FEW_TO_TELL.format(counted)] if (counted := np.count_nonzero(full.weight)) < FEWEST else []),
         ],
         remainders=tests,
         name=m.name,

@@ -14,6 +14,8 @@ from .swing import Swing
 
 Array = NDArray[np.float64]
 
+FEWEST = 60  # samples that a test is made on
+TIMES = 3.0  # the noise's power: in a campaign no model that lacks nothing left 1.3 times
 LEVEL = 0.01
 CRUMB = 0.002
 SENTENCES = {
@@ -31,7 +33,7 @@ SENTENCES = {
 def remains(data: Data, residual_N: Array, spent: int, swing: Swing | None) -> list[Remainder]:
     """The tests, most telling first. `residual_N` (n,) on the data's grid; `spent`: numbers fitted."""
     use = np.flatnonzero(data.weight > 0)
-    if len(use) < 60:
+    if len(use) < FEWEST:
         return []
     e = data.whitened(residual_N)[use]
     groups = _groups(data, use)
@@ -47,6 +49,12 @@ def remains(data: Data, residual_N: Array, spent: int, swing: Swing | None) -> l
     if swing is not None:
         out.append(Remainder("swing", 0.0, swing.share, SENTENCES["swing"].format(frequency=swing.frequency_Hz), True))
     return sorted(out, key=lambda r: (not r.passed, -r.share))
+
+
+def beyond_chance(data: Data, residual_N: Array) -> bool:
+    """Whether what is left is several times the noise's power: no test has to see a structure in that."""
+    weight = data.weight
+    return float(np.sum(weight * (residual_N / data.total_N) ** 2)) > TIMES * float(weight.sum())
 
 
 def _remainder(name: str, p: float, share: float, made: int) -> Remainder:

@@ -48,6 +48,8 @@ UNTOLD = 0.7
 """Of a number, that its standard deviation may be for it to be told."""
 LEAST = 0.01
 """Share of the gain below which its size says no more."""
+NEARLY = 1.15
+"""Times the noise, up to which an error is said to be down to it."""
 NOT_KNOWN = "no cause that is known here was found to do all of this: look at what remains before trusting the model"
 NOT_SURE = "names so little sure explain nothing: test them by another run before trusting them or the model"
 REMAINS = 3
@@ -84,6 +86,8 @@ def verdict(d: Diagnosis) -> str:
     """The verdict in a few words."""
     what = "The bench in free air" if in_air(d) else "The model"
     if d.verdict == "consistent":
+        if d.rmse_before > NEARLY * d.noise_floor > 0 and d.held_out_before > NEARLY * d.noise_floor:
+            return f"{what} explains these data as far as they tell anything beyond their motion and noise"
         return (
             f"{what} explains these data down to their noise" if not in_air(d) else f"{what} adds nothing to the noise"
         )

@@ -20,7 +20,7 @@ from .past import with_pasts
 from .path import straightened
 from .points import points
 from .problem import Problem, build
-from .profile import not_told
+from .profile import CERTAIN, not_told
 from .result import Evidence, FitResult
 from .select import Choice, choose
 from .traces import figures_of, traces_of
@@ -65,6 +65,8 @@ def fit(
     loose |= set(undetermined)
     loose |= {"nu" + name[1:] for name in loose if name.startswith("c_")}  # a share that may be nothing has no rate
     about = notes.findings(problem, noise, best.structure.unilateral)
+    if about.still:
+        loose -= {name for name in loose if name.startswith("nu_") and relative[name] < CERTAIN}
     loose |= about.lost(found)
     undetermined = [name for name in found if name in loose]
     traces = traces_of(problem, best)

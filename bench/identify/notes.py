@@ -18,6 +18,8 @@ from .nuisance import late_s, moved_mm
 from .past import begins_loaded, fitted_past, said_of_past
 from .problem import Problem
 
+LEAST_WAY = 1e-3  # of the depth: less is no motion that a law is told by
+
 LAW, SHARES, RATES = "law", "shares", "rates"
 EVERYTHING = frozenset({LAW, SHARES, RATES})
 OF = {"c": {SHARES}, "nu": {RATES}, "a": {RATES}, "b": {SHARES, RATES}}
@@ -31,6 +33,8 @@ class Findings:
 
     notes: list[str] = field(default_factory=list)
     spoilt: set[str] = field(default_factory=set)
+    still: bool = False
+    """Whether nothing moves: the force tells rates, whatever the shares are."""
 
     def lost(self, names: Collection[str]) -> set[str]:
         """Those of a fit's numbers that are spoilt."""
@@ -62,6 +66,13 @@ def findings(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = Tru
         out.append(
             f"All moves are at one speed ({np.median(speeds):.3g} mm/s): what other speeds do rests on the model."
         )
+    every.still = not any(_moves(m, noise) for m in measurements)
+    if every.still:
+        out.append(
+            "The position does not move while the force counts: that shows how fast the force relaxes, and neither the"
+            " elastic law nor the shares. (Is the position's column right?)"
+        )
+        every.spoilt |= {LAW, SHARES}
     if not noise.from_holds:
         out.append("There is no hold: the noise was judged from the motion, slow modes by the model alone.")
     if problem.depth_mm < 10 * noise.position_mm:
@@ -71,6 +82,12 @@ def findings(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = Tru
         )
         every.spoilt.add(LAW)
     return every
+
+
+def _moves(m: Measurement, noise: Noise) -> bool:
+    """Whether the position does, by more than its noise and a thousandth of the depth, while the force counts."""
+    position = m.position_at_forces_mm()[m.counted()]
+    return float(np.ptp(position)) > max(8 * noise.position_mm, LEAST_WAY * float(np.abs(position).max(initial=0.0)))
 
 
 def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findings:

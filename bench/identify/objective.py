@@ -121,8 +121,10 @@ def normal_equations(problem: Problem, structure: Structure, x: Array) -> tuple[
 
 
 def prior_of(problem: Problem, structure: Structure) -> Array:
-    """What each x² costs, (P,): nothing but for the runs' own doubts, which are the last of θ."""
+    """What each x² costs, (P,): nothing but for the runs' own doubts, which are the last of θ, and for what a past has
+    left: of the order of F^e(D), which no data feel that tell it; where nothing moves it and the shares are one."""
     out = np.zeros(structure.size)
+    out[structure.family.size : structure.shape_size] = problem.noise_square
     k, count = structure.family.size, len(problem.prior)
     out[k - count : k] = problem.prior
     return out

@@ -20,6 +20,7 @@ from .uncertainty import independent_samples
 
 CONTENDERS = 6  # candidates polished before they are compared
 CLEAR = 6.0  # difference of the criterion that decides (some 20 to 1 in odds)
+POORER = 2.0  # times the error
 LARGE = 40_000  # samples beyond which candidates are compared on a finer stand-in of about so many blocks
 # The position's noise is better out: sample by sample a law gains where it is soft at the depth of a long hold alone.
 FINE = 0.015  # growth of its blocks in a hold: what they leave out is small against the least difference that counts
@@ -66,7 +67,8 @@ def choose(
 
     The criterion is n_e ln V + P ln n_e; n_e is the number of independent samples that the residual of the
     candidate with the least V is worth, so that coloured residuals do not buy modes. The lowest wins, unless a
-    simpler one is within `CLEAR` of it and predicts left-out blocks as well, or predicts them 5 % better at all.
+    simpler one is within `CLEAR` of it and predicts left-out blocks as well, or predicts them 5 % better at all and is
+    not `POORER` on what it was fitted to (one that no left-out block resembles tells nothing of either).
     Contact is chosen first, by the lowest criterion; where the pad never lets go in the simulation the two are one
     model, and `unilateral` is what it is called.
     """
@@ -202,6 +204,9 @@ def _pick(candidates: list[Candidate], order_given: bool) -> Candidate:
     elif able:  # a force that goes on falling is no reason to leave out the mode that it needs
         least = min(c.criterion for c in able) - 2 * CLEAR
         able += [c for c in ended if not c.eligible and c.estimate.distinct_but_slow and c.criterion < least]
+    if able:  # a search that came to no end is no reason to take one that has twice its error
+        least = min(c.V for c in able) / POORER**2
+        able += [c for c in candidates if c.estimate.physical and c.estimate.distinct and least > c.V]
     able = able or candidates
     able = sorted(able, key=lambda c: c.criterion)
     # The contact whose best is best; a tie goes to the pad that can let go.
@@ -216,6 +221,6 @@ def _pick(candidates: list[Candidate], order_given: bool) -> Candidate:
         if c.size >= best.size:
             continue
         as_well = c.held_out_square <= best.held_out_square and c.criterion < best.criterion + CLEAR
-        if as_well or 1.1 * c.held_out_square < best.held_out_square:
+        if as_well or (1.1 * c.held_out_square < best.held_out_square and c.V < POORER**2 * best.V):
             return c
     return best

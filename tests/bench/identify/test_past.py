@@ -124,3 +124,22 @@ def test_derivatives_by_the_past_are_exact(unilateral: bool) -> None:
         same = up.let_go == down.let_go
         numeric = (up.force - down.force) / 2e-6
         np.testing.assert_allclose(piece.jacobian[same, j], numeric[same], atol=2e-7 * max(1.0, np.abs(numeric).max()))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_relaxation_alone_tells_rates_and_nothing_else(seed: int) -> None:
+    """The probe stands in the pad from the first row on: the law chosen is any, the order that of the data."""
+    rng = np.random.default_rng(seed)
+    rates = (rng.uniform(2.0, 4.0), rng.uniform(0.15, 0.3))
+    pad = Pad(Exponential(2.0, 0.5), (0.3, 0.12), rates)
+    motion = staircase([2.0], 60.0, 42.0)
+    t = np.arange(0.0, motion.duration_s, 0.005)
+    F = simulate(pad, motion, t).force_N + 0.006 * rng.standard_normal(len(t))
+    late = (t > 1.2) & (t < 41.0)
+    result = fit(measurement(t[late] - t[late][0], motion.position(t[late]), F[late]))
+    assert result.order == 2 and result.rmse < 1.05 * 0.006
+    assert set(result.undetermined) == {name for name in result.parameters if not name.startswith("nu_")}
+    for i, rate in enumerate(rates, 1):
+        found = result.parameters[f"nu_{i}"]
+        assert abs(found.value - rate) < 3.5 * found.std < 0.1 * rate
+    assert any("does not move" in note for note in result.notes)
