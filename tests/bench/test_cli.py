@@ -240,6 +240,14 @@ FIT_KEYS = {
 """contracts.md, fit.json, for the continuous method."""
 
 
+def test_a_fit_that_leaves_more_than_noise_says_so_and_what_to_do(padbench, csv):
+    plain = padbench("fit", csv, *FIT)
+    assert "times the noise" not in plain.out and "padbench diagnose" not in plain.out
+    poor = padbench("fit", csv, "--law", "polynomial", "--degree", "1", "--order", "1", "--write", "my model.yaml")
+    assert poor.status == 0 and "times the noise: it lacks something" in poor.out
+    assert poor.out.rstrip().endswith(f"padbench diagnose {csv} --model 'my model.yaml'")
+
+
 def test_fit_json_is_what_is_promised(padbench, csv):
     said = padbench("fit", csv, *FIT, "--json", "-")
     assert said.status == 0 and said.err == ""
