@@ -10,15 +10,16 @@ import importlib
 import io
 import os
 import re
+import signal
 import sys
 import tempfile
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
 from bench.commands.outputs import check_outputs
-from bench.errors import EXIT_BAD_INPUT, EXIT_DEFECT, EXIT_NO, PadbenchError
+from bench.errors import EXIT_BAD_INPUT, EXIT_DEFECT, EXIT_NO, PadbenchError, stop_of
 from bench.one_thread import one_thread
 
 COMMANDS = {
@@ -135,15 +136,16 @@ def main(argv: list[str] | None = None) -> int:
         top.print_help(sys.stderr)
         return EXIT_BAD_INPUT
     try:
-        check_outputs(args)
-        status = int(_module(args.command).main(args))
-        sys.stdout.flush()  # what cannot be written is said here, not at the interpreter's end
-        return status
+        with _signals_end_it():
+            check_outputs(args)
+            status = int(_module(args.command).main(args))
+            sys.stdout.flush()  # what cannot be written is said here, not at the interpreter's end
+            return status
     except PadbenchError as error:
         print(f"padbench {args.command}: {error}", file=sys.stderr)
         return error.status
-    except KeyboardInterrupt:
-        print(f"padbench {args.command}: stopped by the operator (Ctrl-C)", file=sys.stderr)
+    except KeyboardInterrupt as stop:
+        print(f"padbench {args.command}: stopped by {stop_of(stop)}", file=sys.stderr)
         return EXIT_NO
     except BrokenPipeError:
         _give_up_output()
@@ -157,6 +159,25 @@ def main(argv: list[str] | None = None) -> int:
         return EXIT_BAD_INPUT
     except Exception as error:
         return _defect(args.command, error)
+
+
+@contextlib.contextmanager
+def _signals_end_it() -> Iterator[None]:
+    """SIGTERM and SIGHUP end a command as Ctrl-C does, with words and status 1; a run itself has them end it softly."""
+
+    def end(number: int, frame: object) -> None:
+        raise KeyboardInterrupt(f"signal {signal.Signals(number).name}")
+
+    before = {}
+    with contextlib.suppress(ValueError):  # not in the main thread: there somebody else has them
+        for name in ("SIGTERM", "SIGHUP"):
+            if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) == signal.SIG_DFL:
+                before[name] = signal.signal(getattr(signal, name), end)
+    try:
+        yield
+    finally:
+        for name, handler in before.items():
+            signal.signal(getattr(signal, name), handler)
 
 
 def _module(name: str) -> Any:

@@ -40,3 +40,8 @@ class Stopped(PadbenchError):
     def __init__(self, cause: str) -> None:
         super().__init__(cause)
         self.cause = cause
+
+
+def stop_of(interrupt: KeyboardInterrupt) -> str:
+    """By what a command was stopped: a signal that says its name, or else Ctrl-C."""
+    return str(interrupt) or "the operator (Ctrl-C)"

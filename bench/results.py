@@ -79,13 +79,27 @@ def analyse(
     Diagnosed is what was believed, or else the fit; a run in air tells of the bench alone. `believed` and `prediction`
     are the recording's own where they are not given. What cannot be fitted (an air run, a run stopped before the pad)
     is said in the report, and so is what cannot be diagnosed. Raises `InputError` where the recording cannot
-    be read.
+    be read, `OSError` with a file's or the folder's name where what is found cannot be written.
     """
-    tell = progress or (lambda _: None)
+    try:
+        return _analysed(folder, prediction, believed, structure or {}, progress or (lambda _: None))
+    except OSError as error:
+        if error.filename is None and error.errno is not None:  # a write that found no room names no file
+            raise OSError(error.errno, error.strerror, str(folder)) from error
+        raise
+
+
+def _analysed(
+    folder: Path,
+    prediction: Prediction | None,
+    believed: Model | None,
+    structure: Mapping[str, Any],
+    tell: Callable[[str], None],
+) -> Results:
     recording = read_recording(folder)
     believed = believed or model_in(recording)
     prediction = prediction or prediction_in(recording, believed)
-    fit, problem = _fit_of(recording, structure or {})
+    fit, problem = _fit_of(recording, structure)
     if fit is not None:
         (folder / FIT).write_text(json.dumps(fit.to_json(), indent=2) + "\n", "utf-8")
         write_model(folder / MODEL, fit.model)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from bench.commands.options import add_bench, say, say_plan, status
 from bench.commands.progress import Progress
-from bench.errors import EXIT_DONE, EXIT_NO, InputError, Refused, Stopped
+from bench.errors import EXIT_DONE, EXIT_NO, InputError, Refused, Stopped, stop_of
 
 if TYPE_CHECKING:
     from bench.config import Bench
@@ -86,15 +86,20 @@ def main(args: argparse.Namespace) -> int:
 
 
 def _after(outcome: Outcome, prediction: Prediction, believed: Model | None) -> None:
-    from bench.results import analyse
-
     try:
+        from bench.results import analyse
+
         with status("fitting the pad's model") as progress:
             results = analyse(outcome.folder, prediction=prediction, believed=believed, progress=progress)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         raise Stopped(
-            "stopped by the operator (Ctrl-C) while the model was fitted\n"
+            f"stopped by {stop_of(stop)} while the model was fitted\n"
             f"  the recording is whole: `padbench report {outcome.folder}` fits it and writes the rest"
+        ) from None
+    except OSError as error:
+        raise Stopped(
+            f"{error.filename or outcome.folder}: what was found cannot be written: {error.strerror}\n"
+            f"  the recording is whole: make room, then `padbench report {outcome.folder}` writes the rest"
         ) from None
     for line in results.lines():
         say(line)

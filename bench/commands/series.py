@@ -60,7 +60,7 @@ def main(args: argparse.Namespace) -> int:
         try:
             with status(f"fitting {folder.name}", quiet=quiet) as progress:
                 results = analyse(folder, believed=series.believed, structure=series.structure, progress=progress)
-        except PadbenchError as error:
+        except (PadbenchError, OSError) as error:
             tell(f"{folder.name}: no fit: {error}")
             return
         for line in results.lines():

@@ -6,8 +6,10 @@ import datetime
 import io
 import json
 import re
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ import numpy as np
 import pytest
 import yaml
 
-from bench import cli
+from bench import cli, results
 from bench.recording import read_recording
 from bench.run.folder import own_folder
 from tests.bench.run.benches import SHORT, bench_file, merged, protocol_file
@@ -395,3 +397,29 @@ def test_ctrl_c_while_the_model_is_fitted_says_where_the_recording_is(padbench, 
     said = padbench("run", protocol_file(tmp_path, AIR), "--out", "out")
     assert said.status == 1 and "Ctrl-C" in said.err and "`padbench report out`" in said.err
     assert Path("out/recording.mcap").is_file()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_a_disk_that_is_full_when_the_fit_is_written_says_what_is_kept(padbench, tmp_path, monkeypatch):
+    def full(folder, **options):
+        (folder / "diagnosis.json").symlink_to("/dev/full")
+        return analyse(folder, **options)
+
+    analyse = results.analyse
+    monkeypatch.setattr("bench.results.analyse", full)
+    said = padbench("run", protocol_file(tmp_path, AIR), "--out", "out")
+    assert said.status == 1 and "out: what was found cannot be written: No space left on device" in said.err
+    assert "`padbench report out`" in said.err and "Traceback" not in said.err
+    monkeypatch.setattr("bench.results.analyse", analyse)
+    Path("out/diagnosis.json").unlink()
+    assert padbench("report", "out").status == 0
+
+
+def test_a_command_that_is_told_to_end_says_so(tmp_path):
+    command = [sys.executable, "-m", "bench.cli", "paper", str(tmp_path / "paper")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        while not (tmp_path / "paper").exists() and process.poll() is None:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGTERM)
+        said = process.communicate()[0]
+    assert process.returncode == 1 and said.rstrip().endswith("padbench paper: stopped by signal SIGTERM")
