@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 
 from bench import identify
 from bench.diagnose import diagnose
-from bench.diagnose.next_test import design
+from bench.diagnose.next_test import design, write_protocol
 from bench.diagnose.words import lines as diagnosis_lines
 from bench.errors import InputError, PadbenchError
 from bench.fitview import fit_view
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
 
 
 DIAGNOSIS = "diagnosis.json"
+
+NEXT = "next_test.yaml"
+"""The protocol that tells apart what a run left in doubt, where there is one."""
 
 WRONG = 1.5
 """Times the noise, beyond which a fit's error is said to be no noise."""
@@ -60,7 +64,7 @@ class Results:
         if self.fit is not None:
             lines = fit_lines(self.fit)
         if self.diagnosis is not None:
-            first, *others = diagnosis_lines(self.diagnosis)
+            first, *others = diagnosis_lines(self.diagnosis, f"`padbench run {shlex.quote(str(self.folder / NEXT))} …`")
             return [*lines, f"diagnosis: {first}", *others]
         return [*lines, f"no diagnosis: {self.diagnosis_problem}"] if self.diagnosis_problem else lines
 
@@ -107,6 +111,9 @@ def _analysed(
     if diagnosis is not None:
         text = json.dumps(diagnosis.to_json(), indent=2, allow_nan=False)
         (folder / DIAGNOSIS).write_text(text + "\n", "utf-8")
+        (folder / NEXT).unlink(missing_ok=True)
+        if diagnosis.next_protocol is not None:
+            write_protocol(folder / NEXT, diagnosis.next_protocol)
     report = folder / REPORT
     tell("writing the report")
     write_report(

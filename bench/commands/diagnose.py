@@ -57,7 +57,8 @@ def main(args: argparse.Namespace) -> int:
     if args.json == "-":
         print(text)
     else:
-        print("\n".join([*(f"{measurement.name}: {note}" for note in measurement.notes), *lines(result)]))
+        how_next = {"how_next": f"written to {args.next}"} if args.next else {}
+        print("\n".join([*(f"{measurement.name}: {note}" for note in measurement.notes), *lines(result, **how_next)]))
         if args.json:
             Path(args.json).write_text(text + "\n", "utf-8")
     if args.write:

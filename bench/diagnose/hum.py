@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 LOWEST_HZ = 8.0
 GRIDS_HZ, MULTIPLES = (50.0, 60.0), (1, 2, 3)
 OFF, STEADY = 0.05, 0.003  # of its frequency, by which a grid may be off, and by which a large one is
+RARER = 1e-3  # of a grid's frequency, by which it must be nearer for each multiple: twice what a grid is off by, mostly
 LEVEL = 1e-5  # of a line by chance, over all frequencies
 LEAST_SHARE = 0.002  # of the noise power
 TOLD = 15.0  # times the noise power per sample: what a further number of the line must take
@@ -289,9 +290,11 @@ def _of_grids(seen_Hz: float, rate_Hz: float) -> dict[float, float]:
 
 
 def _unfolded(seen_Hz: float, rate_Hz: float) -> list[float]:
-    """Frequencies of the mains that look like this one, nearest to a grid's first; itself, where there are none."""
+    """Frequencies of the mains that look like this one, nearest to a grid's first, where as near the
+    least multiple; itself, where there are none."""
     found = _of_grids(seen_Hz, rate_Hz)
-    return sorted(found, key=lambda f: found[f]) or [seen_Hz]
+    multiple = {f: min(round(f / grid) for grid in GRIDS_HZ if abs(f / grid - round(f / grid)) < 0.1) for f in found}
+    return sorted(found, key=lambda f: found[f] + RARER * (multiple[f] - 1)) or [seen_Hz]
 
 
 def _told(t: Array, e: Array, candidates: Sequence[float], spacing: float, least: float) -> float:

@@ -142,8 +142,8 @@ def lowered(sentence: str) -> str:
     return sentence[:1].lower() + sentence[1:]
 
 
-def lines(d: Diagnosis) -> list[str]:
-    """The diagnosis in some lines for a terminal."""
+def lines(d: Diagnosis, how_next: str = "`--next FILE` writes the protocol") -> list[str]:
+    """The diagnosis in some lines for a terminal; `how_next`: where the next test is, or how to come by it."""
     out = [headline(d)]
     for number, cause in enumerate(d.causes, 1):
         out += _cause(number, cause)
@@ -154,7 +154,7 @@ def lines(d: Diagnosis) -> list[str]:
     out += [f"  {sentence}" for sentence in warnings(d)]
     out += [f"  {sentence}"] if (sentence := not_known(d)) else []
     if d.next_protocol is not None:
-        out.append(f"  next test: {d.next_protocol['description']} (`--next FILE` writes the protocol)")
+        out.append(f"  next test: {d.next_protocol['description']} ({how_next})")
     return out
 
 

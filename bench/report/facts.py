@@ -52,6 +52,7 @@ _BESIDE = {
     "model.yaml": "the fitted model, for `padbench simulate`",
     "fit.json": "the fit in numbers",
     "diagnosis.json": "what the model leaves, and why",
+    "next_test.yaml": "the protocol that tells apart what is left in doubt",
 }
 
 

@@ -15,9 +15,14 @@ from bench.diagnose.hum import Line, find
 from bench.diagnose.needed import _with_hum
 from bench.diagnose.noise import Part
 from bench.diagnose.refit import onto, refit
+from bench.diagnose.words import lines
+from bench.recording.types import Measurement
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
 from tests.truth.cases import draw_case
+from tests.truth.laws import Exponential
+from tests.truth.motion import staircase
+from tests.truth.pad import Pad, simulate
 
 Array = np.ndarray
 
@@ -210,3 +215,29 @@ def test_a_line_is_told_by_the_times_at_which_forces_were_felt():
         assert found["clock_skew"].parameters["skew"].value == pytest.approx(
             c.truth.parameters["clock_skew"]["skew"], rel=0.1
         )
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_hum_at_half_the_rate_is_named_or_said_to_be_unseen(seed: int) -> None:
+    """49.97 Hz at 100 samples a second turn their sign with each sample, as noise may: what would tell it is said."""
+    rng = np.random.default_rng(seed)
+    pad = Pad(Exponential(2.24, 0.69), (0.25, 0.15), (4.0, 0.35))
+    believed = {
+        "pad": {
+            "elastic": {"law": "exponential", "m": 2.24, "b": 0.69},
+            "relaxation": {"shares": [0.25, 0.15], "rates": [4.0, 0.35]},
+            "contact": "unilateral",
+        },
+        "effects": [],
+    }
+    motion = staircase([0.6, 1.2, 1.8, 0.9], 10.0, 8.0)
+    t = np.arange(0.0, motion.duration_s, 0.01)
+    clean = simulate(pad, motion, t).force_N + 0.005 * rng.standard_normal(len(t))
+    for hum_N in (0.0, 0.03):
+        force = clean + hum_N * np.sin(2 * np.pi * 49.97 * t + rng.uniform(0, 6))
+        d = diagnose(Measurement("mains", t, motion.position(t), t, force), Model.from_dict(believed))
+        said = any("half the rate of the samples" in line for line in lines(d))
+        named = [c.parameters["frequency"].value for c in d.causes if c.id == "mains_hum"]
+        assert said == (hum_N > 0 and not named)
+        # folded, 49.97 and 50.03 Hz are one frequency, and thrice the mains is no likelier
+        assert all(abs(f - 50.0) < 0.05 for f in named)
