@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from sim.jit import compiled
 
@@ -18,6 +19,7 @@ SHORT = 1500  # samples that need no stand-in
 TARGET, MOST = 4000, 6000  # samples of the stand-in, where its blocks can be that long
 FASTEST, WIDEST = 0.12, 8.0  # growth of blocks; times what the travel within one may make of force
 RESTS = 81  # samples that make a rest
+STEP, LOUD = 3, 8.0  # samples within which a force steps, and by how many times its noise at the least
 FINELY = 2e-3  # of the travel, that a block spans at the most: in air no stiffness says how finely
 
 
@@ -30,19 +32,42 @@ def blocks(
     if n <= SHORT:
         return np.arange(n)
     travel = float(np.ptp(full.position_mm))
+    late = _late_steps(full, stiffness)
     finest = min(sigma_force / max(stiffness, 1e-9), FINELY * travel)
     between = float(np.sqrt(finest * travel))
     rate, wider = 0.05, 1.0
     while True:
-        owner = _grouped(full, wider * finest * (rate / 0.05), rate, jump_mm, between, corners)
+        owner = _grouped(full, wider * finest * (rate / 0.05), rate, jump_mm, between, corners, late)
         if owner[-1] < TARGET or (rate > FASTEST and (owner[-1] < MOST or wider >= WIDEST)):
             return owner
         # within a move the force goes nearly straight with the position: wide blocks hide less there than after corners
         rate, wider = (rate, 2.0 * wider) if rate > FASTEST else (1.4 * rate, wider)
 
 
+def _late_steps(full: Data, stiffness: float) -> NDArray[np.bool_]:
+    """Where the force steps though the position does not (n,): a force whose clock is far off answers long after."""
+    out = np.zeros(full.size, dtype=bool)
+    felt = np.flatnonzero(full.weight > 0)
+    if felt.size > 2 * STEP:
+        force = median_filter(full.force_N[felt], 2 * STEP - 1, mode="nearest")
+        rise_N = np.abs(force[STEP:] - force[:-STEP])
+        position = full.position_mm[felt]
+        moved_N = stiffness * np.abs(position[STEP:] - position[:-STEP])
+        noise_N = full.total_N[felt]
+        steps = (rise_N > LOUD * np.maximum(noise_N[STEP:], noise_N[:-STEP])) & (moved_N < 0.5 * rise_N)
+        for k in range(STEP + 1):
+            out[felt[k : felt.size - STEP + k]] |= steps
+    return out
+
+
 def _grouped(
-    full: Data, reach: float, rate: float, jump_mm: float, between: float, corners: NDArray[np.bool_]
+    full: Data,
+    reach: float,
+    rate: float,
+    jump_mm: float,
+    between: float,
+    corners: NDArray[np.bool_],
+    late: NDArray[np.bool_],
 ) -> NDArray[np.intp]:
     """`reach`: travel within a block, mm, and `between` where it has no force and is within a sample's time: there no
     more is asked than that a law's bend be met; `rate`: growth of blocks; `jump_mm`: what noise alone makes of a change
@@ -55,7 +80,7 @@ def _grouped(
         bent = np.abs(position[2 * k :] - 2 * position[k:-k] + position[: -2 * k]) > max(0.5 * reach, jump_mm)
         sharper = np.convolve(turns, np.ones(2 * k + 1), mode="same")[k:-k] > 0.5
         turns[k:-k] |= bent & ~sharper
-    turns |= _rests(position, max(0.5 * reach, jump_mm))
+    turns |= _rests(position, max(0.5 * reach, jump_mm)) | late
     corner = np.flatnonzero(turns)
     index = np.arange(full.size)
     since = index - corner[np.searchsorted(corner, index, side="right") - 1]

@@ -30,7 +30,7 @@ from .noise import SETTLED_S
 from .noiseless import without_noise
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
-from .refit import force_at
+from .refit import Fit, force_at
 from .remains import FEWEST, beyond_chance, remains
 from .result import Alternative, Diagnosis
 from .search import A_PART, Search
@@ -143,6 +143,12 @@ def _pads(m: Measurement, believed: Model, structure: Structure, good: Mask) -> 
     return starts
 
 
+def _units(m: Measurement, believed: Structure, refitted: Fit, ended: Fit) -> list[str]:
+    """What makes the units doubtful: of the belief refitted, where that is so still with the causes that were found."""
+    said = doubts(m, believed.pad.pad, refitted.pad)
+    return said if doubts(m, believed.pad.pad, ended.pad) else []
+
+
 def _hum_unseen(swing: Swing | None, sample_s: float) -> list[str]:
     """What to say of a swing at half the samples' rate, where that is the frequency of the mains or a harmonic."""
     half_Hz = 0.5 / sample_s
@@ -208,7 +214,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
         notes=list(m.notes),
         doubts=[
-            *doubts(m, search.believed.pad.pad, path.fits[0].pad),
+            *_units(m, search.believed, path.fits[0], whole[1]),
             *prepared.said_of_noise,
             *_past(search),
             *_hum_unseen(swing, prepared.sample_s),

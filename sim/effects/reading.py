@@ -24,7 +24,8 @@ class _Reading(string.Formatter):
         if "/" in format_spec:
             return str(format_spec.split("/")[value < 0.0])
         if format_spec == "size":
-            return f"{abs(value):.3g}"
+            three = f"{abs(value):.3g}"
+            return three if abs(value) < 1000.0 else f"{float(three):.0f}"
         if format_spec == "milli":
             return f"{1e3 * abs(value):.3g}"
         if format_spec == "percent":
