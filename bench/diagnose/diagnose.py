@@ -23,6 +23,7 @@ from .asked_again import asked_again, hum_asked_again, with_pulses
 from .candidates import CHANNEL
 from .channel import FEW, Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, joined
+from .contact import stays_bonded
 from .data import Prepared, prepare
 from .evidence import SPEAKS, beyond_limit, held_back
 from .needed import Needed, needed
@@ -218,6 +219,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
             *prepared.said_of_noise,
             *_past(search),
             *_hum_unseen(swing, prepared.sample_s),
+            *(stays_bonded(search, path) if causes else []),
             *([ENDED_EARLY] if path.cut_short else []),
             *([FEW_TO_TELL.format(counted)] if (counted := np.count_nonzero(full.weight)) < FEWEST else []),
         ],
