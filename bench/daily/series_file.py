@@ -30,14 +30,18 @@ class Pad(Sample):
     id: Name
 
 
+FileName = Annotated[Word, Field(min_length=1, max_length=1000)]
+"""A file or folder, from where the list is, or from the root."""
+
+
 class SeriesFile(_Part):
     """A list file. Files in it are relative to it."""
 
     name: Word = ""
-    bench: Name = Field(description="bench file or shipped name")
-    protocol: Name = Field(description="protocol file or shipped name")
+    bench: FileName = Field(description="bench file or shipped name")
+    protocol: FileName = Field(description="protocol file or shipped name")
     pad: Word | None = Field(None, description="the pads as the lab believes them to be: model file or shipped name")
-    out: Name = Field(description="folder of the series: a run folder for each pad, series.json, series.csv")
+    out: FileName = Field(description="folder of the series: a run folder for each pad, series.json, series.csv")
     rest_s: NotNegative = Field(0.0, description="s, from mounting a pad (or its last contact) to its run")
     operator: Word | None = None
     conditions: Word | None = None

@@ -336,6 +336,19 @@ def test_a_list_that_cannot_be_meant(padbench, tmp_path, case):
     assert "Traceback" not in said.err and not (tmp_path / "out").exists()
 
 
+def test_files_of_a_list_are_relative_to_it(tmp_path):
+    path = list_file(tmp_path)
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "protocol.yaml").rename(tmp_path / "kept" / "stairs.yaml")
+    (tmp_path / "lists").mkdir()
+    listed = yaml.safe_load(path.read_text())
+    bench = str((tmp_path / listed["bench"]).resolve())
+    moved = tmp_path / "lists" / "list.yaml"
+    moved.write_text(yaml.safe_dump(listed | {"bench": bench, "protocol": "../kept/stairs.yaml", "out": "../out/gels"}))
+    series = load_series(moved)
+    assert series.protocol.steps and series.out.resolve() == tmp_path / "out" / "gels"
+
+
 def test_other_bad_input(padbench, tmp_path):
     missing = padbench("series", "nowhere.yaml")
     assert missing.status == 2 and "nowhere.yaml: there is no such file" in missing.err
