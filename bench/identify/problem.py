@@ -23,6 +23,8 @@ __all__ = ["Problem", "Run", "build"]
 
 PIECE = 1 << 17  # samples looked at at once
 LARGEST = 1e12  # N, mm, s: what is beyond is no measurement, and its square soon no number
+FAR, ACTS, NONE = 0.7, 0.3, 0.1  # of the way up; of the largest force, that acts there and does not below
+FEW_SAMPLES = 10
 SURELY = 3.0  # standard deviations of the surface beyond which a depth is one
 
 
@@ -126,7 +128,7 @@ def build(measurements: Sequence[Measurement], between: bool = False, blocks: bo
 
 def must_touch(measurements: Sequence[Measurement]) -> None:
     """Raises InputError, naming them, where none of some measurements shows a pad that is pressed: no sample deeper
-    than the surface, or not while the force counts, or a force that is the same throughout."""
+    than the surface, or not while the force counts, or a force that is the same throughout or acts above it alone."""
     names = ", ".join(m.name for m in measurements)
     if max(float(m.position_mm.max()) for m in measurements) <= 0:
         raise InputError(names, "the position never passes the surface (0 mm), so there is no contact to fit",
@@ -135,6 +137,23 @@ def must_touch(measurements: Sequence[Measurement]) -> None:
         raise InputError(names, "the probe is never in the pad where the force counts, so there is no contact to fit",
                          "Was the run stopped before its first step reached the pad?")  # fmt: skip
     must_vary(measurements)
+    for m in measurements:
+        must_be_upright(m)
+
+
+def must_be_upright(m: Measurement) -> None:
+    """Raises InputError where the force acts far above the surface and not below: a machine that counts compression
+    as negative."""
+    counted = m.counted()
+    position, force = m.position_at_forces_mm()[counted], np.abs(m.force_N[counted])
+    lowest, top = float(position.min(initial=0.0)), float(np.quantile(force, 0.99)) if force.size else 0.0
+    above, below = position < FAR * lowest, position > 0.0
+    if lowest >= -float(position.max(initial=0.0)) or min(above.sum(), below.sum()) < FEW_SAMPLES:
+        return
+    if float(np.median(force[above])) > ACTS * top and float(np.median(force[below])) < NONE * top:
+        said = f"the force acts down to a position of {lowest:.4g} mm, above the surface, and not below it"
+        cure = "Is the position's sign turned? It counts into the pad: `--units position=-mm` (and `force=-N`) turn it."
+        raise InputError(m.name, said, cure)
 
 
 def must_vary(measurements: Sequence[Measurement]) -> None:

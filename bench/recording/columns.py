@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 
 from bench.errors import InputError
@@ -41,7 +42,8 @@ def parse_columns(text: str, place: str = "--columns") -> dict[str, str]:
 
 
 def parse_units(text: str, place: str = "--units") -> dict[str, str]:
-    """`position=m,force=mN` as a mapping of units that are known. Raises `InputError`."""
+    """`position=m,force=-mN` as a mapping of units that are known, with a minus where the sign is turned. Raises
+    `InputError`."""
     units = _pairs(text, place, "unit")
     for what, unit in units.items():
         _factor(what, unit, place)
@@ -101,7 +103,9 @@ def _cure(missing: Sequence[tuple[str, str]], header: Sequence[str]) -> str:
         near = difflib.get_close_matches(wanted.lower(), [h.lower() for h in header], 1, 0.5)
         same = [h for h in header if near and h.lower() == near[0]] or [h for h in header if what in h.lower()]
         hints.append(f"{what}={same[0] if same else '…'}")
-    return f"columns there: {_listed(header)}; say which is what: --columns {','.join(hints)} (and --units)"
+    return (
+        f"columns there: {_listed(header)}; say which is what: --columns {shlex.quote(','.join(hints))} (and --units)"
+    )
 
 
 def _pairs(text: str, place: str, kind: str) -> dict[str, str]:
@@ -131,6 +135,8 @@ def _check_keys(given: Mapping[str, str], place: str) -> None:
 
 def _factor(what: str, unit: str, place: str) -> float:
     table = UNITS[what]
+    if unit.startswith("-") and what in ("position", "force"):
+        return -_factor(what, unit[1:], place)
     unit = unit.replace("\u03bc", "µ")  # the Greek letter, which looks the same
     if unit not in table:
         raise InputError(place, f"{unit!r} is no unit of {what.replace('_', ' ')}", f"known: {', '.join(table)}")

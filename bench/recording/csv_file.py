@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -16,6 +17,9 @@ from bench.recording.types import Array, ForceChannel, MotorChannel, Recording
 
 COMMAND, MOTOR_FORCE, GROSS, OVERLOAD = "command_mm", "motor_force_N", "gross_N", "overload"
 """Further columns with a meaning, which the writer makes from a run's recording; all may be missing."""
+
+
+_CLOCK = re.compile(r"\d[-/.:]\d{1,2}[-/.:]\d")
 
 
 def read_csv(path: Path, columns: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None) -> Recording:
@@ -123,6 +127,10 @@ def _complaint(cell: str, table: Table, column: int) -> tuple[str, str]:
         return f"{cell!r} in column {name!r} is too large for a number", ""
     if "," in cell:
         return f"{cell!r} in column {name!r} is not a number", "write decimals with a point"
+    if _CLOCK.search(cell):
+        return f"{cell!r} in column {name!r} is a date or clock", "write times as seconds, from any beginning"
+    if cell == name:
+        return f"the header stands there again: {cell!r}", "a file holds one measurement: were two joined?"
     return f"{cell!r} in column {name!r} is not a number", "is there a line of units or remarks? begin it with #"
 
 

@@ -53,7 +53,7 @@ def read_table(path: Path) -> Table:
     first = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), None)
     if first is None:
         raise InputError(str(path), "is empty", _WANTED)
-    _must_be_rows(path, first)
+    _must_be_rows(path, text, first)
     separator = max(_SEPARATORS, key=first.count)
     if first.count(separator) == 0:
         separator = ","
@@ -81,6 +81,8 @@ def read_table(path: Path) -> Table:
     if decimal_comma:
         notes.append("decimal commas taken as decimal points")
     table = Table(path, header, rows, lines, separator, decimal_comma, notes)
+    if rows and len(rows[0]) != len(header):
+        _must_begin(path, text, first)
     _check_lengths(table)
     if len(rows) < 2:
         count = "no row" if not rows else "a single row"
@@ -119,7 +121,7 @@ def _decode(path: Path, notes: list[str]) -> str:
     return text
 
 
-def _must_be_rows(path: Path, first: str) -> None:
+def _must_be_rows(path: Path, text: str, first: str) -> None:
     """Other kinds of text, told by the ending or by their first line: what they lack of a table is not the fault."""
     kind = _OTHER_KINDS.get(path.suffix.lower())
     if kind is None and first.lstrip().startswith(("{", "[")):
@@ -127,10 +129,30 @@ def _must_be_rows(path: Path, first: str) -> None:
     if kind is None and first.lstrip().startswith("<"):
         kind = "HTML or XML"
     if kind is None and (first.startswith(("---", "%YAML")) or _YAML_KEY.match(first)):
+        _must_begin(path, text, first)
         kind = "YAML"
     if kind is not None:
         what = "; a model, bench or protocol file?" if kind == "YAML" else ""
         raise InputError(str(path), f"is {kind}, and no measured data{what}", _WANTED)
+
+
+def _must_begin(path: Path, text: str, first: str) -> None:
+    """Raises `InputError` where a table stands further down, below lines that are none of it."""
+    if begins := _table_begins(text):
+        said = f"{first!r} is no header: the table begins in line {begins}"
+        raise InputError(f"{path}:1", said, "begin what is above it with #")
+
+
+def _table_begins(text: str) -> int:
+    """The line of the first header over rows of numbers, from 1; 0: there is none."""
+    lines = text.splitlines()
+    for separator in _SEPARATORS:
+        cells = [line.split(separator) for line in lines]
+        for i, (names, one, two) in enumerate(zip(cells, cells[1:], cells[2:], strict=False), 1):
+            numbers = all(_is_number(cell.replace(",", ".")) for row in (one, two) for cell in row)
+            if len(names) == len(one) == len(two) > 2 and numbers and not any(_is_number(cell) for cell in names):
+                return i
+    return 0
 
 
 def _check_header(header: Sequence[str], path: Path, line: int) -> None:
@@ -155,7 +177,7 @@ def _check_lengths(table: Table) -> None:
             cure = f"the header is separated by {_SEPARATORS[table.separator]}s, this line is not"
         elif i == len(table.rows) - 1:
             cure = "the last line is not complete: was the file cut off? remove the line"
-        raise InputError(table.place(i), message, cure)
+        raise InputError(table.place(i), message, cure or "each line needs a cell for each column, empty or not")
 
 
 def _comma_decimals(row: Sequence[str]) -> bool:

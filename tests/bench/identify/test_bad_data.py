@@ -282,3 +282,20 @@ def test_methods_that_start_from_rest_say_so_of_loaded_data(tmp_path, capsys):
     for method, words in (("recursive", "takes it as at rest"), ("continuous", "was fitted with it")):
         assert cli.main(["fit", str(csv), "--method", method, "--law", "exponential", "--order", "1"]) == 0
         assert words in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("force_too", [False, True])
+def test_a_position_of_turned_sign_is_refused_with_its_cure(seed, force_too):
+    """As a testing machine exports compression: the fit of it had explained less than nothing."""
+    rng = np.random.default_rng(seed)
+    pad = draw.pad(rng, orders=(1, 2)).pad
+    motion = Way(-0.5).hold(1).to(1.5, 5).hold(5).to(-0.4, 5).hold(3).to(2, 5).hold(5).motion()
+    t = np.arange(0.0, motion.duration_s, 0.01)
+    x, force = motion.position(t), simulate(pad, motion, t).force_N
+    force = force + 2e-3 * force.max() * rng.standard_normal(t.size)
+    upright = Measurement("export", t, x, t, force)
+    build([upright])
+    turned = replace(upright, position_mm=-x, force_N=-force if force_too else force)
+    with pytest.raises(InputError, match=r"above the surface.*\n?.*--units position=-mm"):
+        build([turned])

@@ -161,6 +161,7 @@ def test_columns_and_units_are_mapped(tmp_path):
         ("position=in,force=lbf", 25.4, 4.4482216152605),  # exact by definition: lb 0.45359237 kg, g 9.80665 m/s²
         ("position=cm,force=g", 10.0, 9.80665e-3),
         ("position=nm,force=kg", 1e-6, 9.80665),
+        ("position=-mm,force=-kN", -1.0, -1e3),  # a machine that counts compression as negative
     ],
 )
 def test_units(tmp_path, units, position, force):
@@ -249,3 +250,24 @@ def test_a_table_is_none_of_them(tmp_path, header):
     path = tmp_path / "data.txt"
     path.write_text(f"{header}\n0,0,0\n1,1,1\n")
     assert len(read_table(path).rows) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("Specimen: gel 7\nspeed: 5\ntime_s,position_mm,force_N\n0,0,0\n1,1,1\n", r":1: 'Specimen: gel 7' .*line 3"),
+        ("gel 7, pressed\ntime_s;position_mm;force_N\n0;0;0\n1;1;1\n", r":1: 'gel 7, pressed' .*line 2"),
+        (
+            "time_s,position_mm,force_N\n2026-03-12T14:00:00,0,0\n2026-03-12T14:00:01,0,0\n",
+            "a date or clock\n.*seconds",
+        ),
+        ("time_s,position_mm,force_N\n14:00:00.0,0,0\n14:00:01.0,0,0\n", "a date or clock\n.*seconds"),
+        ("time_s,position_mm,force_N\n0,0,0\ntime_s,position_mm,force_N\n0,0,0\n", ":3:1: the header .* again\n?.*"),
+        ("Time (s),x,F\n0,0,0\n1,1,1\n", r"--columns 'time=Time \(s\),"),
+    ],
+)
+def test_what_exports_have_about_a_table_is_refused_with_its_cure(tmp_path, text, said):
+    path = tmp_path / "export.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        read_csv(path)
