@@ -237,8 +237,8 @@ This page is made by `python -m docs.effects`.
 
 RECIPE = """## A new cause in one file
 
-Put a file into `sim/effects/`. Defining `EFFECT` registers it: model files, schemas, the simulated bench, diagnosis and
-this page find it by its id.
+Put a file into `sim/effects/`. Defining `EFFECT` registers it: model files, schemas, the simulated bench and diagnosis
+find it by its id.
 
     \"\"\"Gain error: the force is off by a factor. Reference: …\"\"\"
 
@@ -280,8 +280,10 @@ this page find it by its id.
    `of_motion=False` where it runs in time or stands at a level: one press and one hold then suffice for a sure name.
    A form of it that goes with the motion all the same says so.
 4. Give the family the shapes its physics takes, the first parameters the same in all.
-5. `tests/sim/test_effects.py` tries every form by itself and in all pairs. Add its physics beside, against a closed
-   form. A line in `GROUPS` of `docs/effects.py` gives it a place on this page.
+5. `tests/sim/test_effects.py` tries every form by itself and in all pairs, and has the parameters of each effect that
+   a user must give in `CONTRACT`: add those of yours there, and its physics beside, against a closed form.
+6. A line in `GROUPS` of `docs/effects.py` gives it a place on this page, one in `NAMES` of `bench/diagnose/words.py` its
+   name in plain words (without, it is called by its id).
 """
 
 
