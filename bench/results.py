@@ -64,7 +64,9 @@ class Results:
         if self.fit is not None:
             lines = fit_lines(self.fit)
         if self.diagnosis is not None:
-            first, *others = diagnosis_lines(self.diagnosis, f"`padbench run {shlex.quote(str(self.folder / NEXT))} …`")
+            next_test = shlex.quote(str(self.folder / NEXT))
+            how_next = f"`padbench run {next_test}`, with the same --bench and --pad"
+            first, *others = diagnosis_lines(self.diagnosis, how_next)
             return [*lines, f"diagnosis: {first}", *others]
         return [*lines, f"no diagnosis: {self.diagnosis_problem}"] if self.diagnosis_problem else lines
 
@@ -129,6 +131,11 @@ def _analysed(
     return Results(folder, fit, problem, report, diagnosis, unclear)
 
 
+def lacking(fit: FitResult) -> bool:
+    """Whether a fit leaves more than can be noise."""
+    return fit.rmse > WRONG * fit.noise_floor > 0
+
+
 def fit_lines(fit: FitResult) -> list[str]:
     """The fit in a few lines: structure, error beside noise, parameters with standard errors."""
     size = f" of degree {fit.degree}" if fit.degree else ""
@@ -144,7 +151,7 @@ def fit_lines(fit: FitResult) -> list[str]:
         verdict = "   undetermined by these data" if name in fit.undetermined else ""
         unit = f" {parameter.unit}" if parameter.unit != "1" else ""
         lines.append(f"  {name:<{width}} = {parameter.value:.5g}{doubt}{unit}{verdict}")
-    if fit.rmse > WRONG * fit.noise_floor > 0:
+    if lacking(fit):
         lines.append(
             f"  the model leaves {fit.rmse / fit.noise_floor:.2g} times the noise: it lacks something, and its numbers "
             "make up for that; their ± hold for the best such model and not for the pad"

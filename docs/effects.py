@@ -282,8 +282,8 @@ find it by its id.
 4. Give the family the shapes its physics takes, the first parameters the same in all.
 5. `tests/sim/test_effects.py` tries every form by itself and in all pairs, and has the parameters of each effect that
    a user must give in `CONTRACT`: add those of yours there, and its physics beside, against a closed form.
-6. A line in `GROUPS` of `docs/effects.py` gives it a place on this page, one in `NAMES` of `bench/diagnose/words.py` its
-   name in plain words (without, it is called by its id).
+6. A line in `GROUPS` of `docs/effects.py` gives it a place on this page, one in `NAMES` of `bench/diagnose/words.py`
+   its name in plain words (without, it is called by its id).
 """
 
 

@@ -41,7 +41,7 @@ def main(args: argparse.Namespace) -> int:
     """Diagnose and print; status 0 whatever the verdict."""
     from bench.config import load_model
     from bench.diagnose import diagnose
-    from bench.diagnose.words import lines
+    from bench.diagnose.words import HOW_NEXT, lines
     from bench.results import is_air_run
 
     model = load_model(args.model)
@@ -57,8 +57,8 @@ def main(args: argparse.Namespace) -> int:
     if args.json == "-":
         print(text)
     else:
-        how_next = {"how_next": f"written to {args.next}"} if args.next else {}
-        print("\n".join([*(f"{measurement.name}: {note}" for note in measurement.notes), *lines(result, **how_next)]))
+        said = lines(result, f"written to {args.next}" if args.next else HOW_NEXT)
+        print("\n".join([*(f"{measurement.name}: {note}" for note in measurement.notes), *said]))
         if args.json:
             Path(args.json).write_text(text + "\n", "utf-8")
     if args.write:

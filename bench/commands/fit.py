@@ -36,7 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Fit and print; status 0 whatever the verdict."""
     from bench import identify
-    from bench.results import WRONG, fit_lines
+    from bench.results import fit_lines, lacking
 
     recordings = read_data(args, *args.data)
     measurements = pads(recordings)
@@ -60,7 +60,7 @@ def main(args: argparse.Namespace) -> int:
         said = " ".join(result.notes)  # most methods repeat what was heard on reading
         heard = [f"{m.name}: {note}" for m in measurements for note in m.notes if note not in said]
         print("\n".join([*heard, *fit_lines(result)]))
-        if result.rmse > WRONG * result.noise_floor > 0:
+        if lacking(result):
             data, model = (shlex.quote(str(path)) for path in (args.data[0], args.write or "MODEL"))
             print(f"what it may lack: padbench diagnose {data} --model {model}")
         if args.json:

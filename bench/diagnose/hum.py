@@ -292,9 +292,11 @@ def _of_grids(seen_Hz: float, rate_Hz: float) -> dict[float, float]:
 def _unfolded(seen_Hz: float, rate_Hz: float) -> list[float]:
     """Frequencies of the mains that look like this one, nearest to a grid's first, where as near the
     least multiple; itself, where there are none."""
-    found = _of_grids(seen_Hz, rate_Hz)
-    multiple = {f: min(round(f / grid) for grid in GRIDS_HZ if abs(f / grid - round(f / grid)) < 0.1) for f in found}
-    return sorted(found, key=lambda f: found[f] + RARER * (multiple[f] - 1)) or [seen_Hz]
+
+    def far(f: float) -> float:
+        return min(abs(f / (n * grid) - 1.0) + RARER * (n - 1) for n in MULTIPLES for grid in GRIDS_HZ)
+
+    return sorted(_of_grids(seen_Hz, rate_Hz), key=far) or [seen_Hz]
 
 
 def _told(t: Array, e: Array, candidates: Sequence[float], spacing: float, least: float) -> float:

@@ -52,6 +52,7 @@ NEARLY = 1.15
 """Times the noise, up to which an error is said to be down to it."""
 NOT_KNOWN = "no cause that is known here was found to do all of this: look at what remains before trusting the model"
 NOT_SURE = "names so little sure explain nothing: test them by another run before trusting them or the model"
+HOW_NEXT = "`--next FILE` writes the protocol"
 REMAINS = 3
 """Sentences on what is left."""
 
@@ -86,10 +87,12 @@ def verdict(d: Diagnosis) -> str:
     """The verdict in a few words."""
     what = "The bench in free air" if in_air(d) else "The model"
     if d.verdict == "consistent":
-        if d.rmse_before > NEARLY * d.noise_floor > 0 and d.held_out_before > NEARLY * d.noise_floor:
-            return f"{what} explains these data as far as they tell anything beyond their motion and noise"
+        if in_air(d):
+            return f"{what} adds nothing to the noise"
+        near = min(d.rmse_before, d.held_out_before) <= NEARLY * d.noise_floor
         return (
-            f"{what} explains these data down to their noise" if not in_air(d) else f"{what} adds nothing to the noise"
+            f"{what} explains these data "
+            f"{'down to their noise' if near else 'as far as they tell anything beyond their motion and noise'}"
         )
     if d.verdict == "explained":
         told = "can be explained by" if unsure(d) else "is explained by"
@@ -142,7 +145,7 @@ def lowered(sentence: str) -> str:
     return sentence[:1].lower() + sentence[1:]
 
 
-def lines(d: Diagnosis, how_next: str = "`--next FILE` writes the protocol") -> list[str]:
+def lines(d: Diagnosis, how_next: str = HOW_NEXT) -> list[str]:
     """The diagnosis in some lines for a terminal; `how_next`: where the next test is, or how to come by it."""
     out = [headline(d)]
     for number, cause in enumerate(d.causes, 1):

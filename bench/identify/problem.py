@@ -15,7 +15,7 @@ from sim.grid import union
 
 from ._kernel import Array
 from .long import is_long, shortened
-from .motion import LONG, jitter
+from .motion import LONG, glanced, jitter
 from .returns import with_returns
 from .runs import Run
 
@@ -144,6 +144,7 @@ def must_touch(measurements: Sequence[Measurement]) -> None:
 def must_be_upright(m: Measurement) -> None:
     """Raises InputError where the force acts far above the surface and not below: a machine that counts compression
     as negative."""
+    m = glanced(m)
     counted = m.counted()
     position, force = m.position_at_forces_mm()[counted], np.abs(m.force_N[counted])
     lowest, top = float(position.min(initial=0.0)), float(np.quantile(force, 0.99)) if force.size else 0.0
