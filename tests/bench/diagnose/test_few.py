@@ -14,14 +14,6 @@ from tests.truth.motion import staircase
 from tests.truth.pad import Pad, simulate
 
 PAD = Pad(Exponential(2.24, 0.69), (0.25, 0.15), (4.0, 0.35))
-BELIEVED = {
-    "pad": {
-        "elastic": {"law": "exponential", "m": 2.24, "b": 0.69},
-        "relaxation": {"shares": [0.25, 0.15], "rates": [4.0, 0.35]},
-        "contact": "unilateral",
-    },
-    "effects": [],
-}
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -36,7 +28,7 @@ def test_a_run_killed_in_its_first_ramp(seed: int, swings_N: float) -> None:
     force += np.where(t > begun_s, swings_N * np.sin(2 * np.pi * 30.0 * (t - begun_s)), 0.0)
     x = motion.position(t)
     m = Measurement("killed", t - t[0], x, t - t[0], force, fit_from_s=1.0)
-    d = diagnose(m, Model.from_dict(BELIEVED))
+    d = diagnose(m, Model.from_dict(PAD.model()))
     if swings_N:
         assert d.verdict == "unexplained" or d.causes
     else:

@@ -19,10 +19,10 @@ from bench.diagnose.words import lines
 from bench.recording.types import Measurement
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
+from tests.bench.diagnose.test_few import PAD
 from tests.truth.cases import draw_case
-from tests.truth.laws import Exponential
 from tests.truth.motion import staircase
-from tests.truth.pad import Pad, simulate
+from tests.truth.pad import simulate
 
 Array = np.ndarray
 
@@ -221,21 +221,12 @@ def test_a_line_is_told_by_the_times_at_which_forces_were_felt():
 def test_hum_at_half_the_rate_is_named_or_said_to_be_unseen(seed: int) -> None:
     """49.97 Hz at 100 samples a second turn their sign with each sample, as noise may: what would tell it is said."""
     rng = np.random.default_rng(seed)
-    pad = Pad(Exponential(2.24, 0.69), (0.25, 0.15), (4.0, 0.35))
-    believed = {
-        "pad": {
-            "elastic": {"law": "exponential", "m": 2.24, "b": 0.69},
-            "relaxation": {"shares": [0.25, 0.15], "rates": [4.0, 0.35]},
-            "contact": "unilateral",
-        },
-        "effects": [],
-    }
     motion = staircase([0.6, 1.2, 1.8, 0.9], 10.0, 8.0)
     t = np.arange(0.0, motion.duration_s, 0.01)
-    clean = simulate(pad, motion, t).force_N + 0.005 * rng.standard_normal(len(t))
+    clean = simulate(PAD, motion, t).force_N + 0.005 * rng.standard_normal(len(t))
     for hum_N in (0.0, 0.03):
         force = clean + hum_N * np.sin(2 * np.pi * 49.97 * t + rng.uniform(0, 6))
-        d = diagnose(Measurement("mains", t, motion.position(t), t, force), Model.from_dict(believed))
+        d = diagnose(Measurement("mains", t, motion.position(t), t, force), Model.from_dict(PAD.model()))
         said = any("half the rate of the samples" in line for line in lines(d))
         named = [c.parameters["frequency"].value for c in d.causes if c.id == "mains_hum"]
         assert said == (hum_N > 0 and not named)
