@@ -30,6 +30,12 @@ def model_in(recording: Recording) -> Model | None:
     return _read(recording, MODEL, Model)
 
 
+def described_in(recording: Recording) -> str:
+    """The description of the protocol that was run; empty where there is none."""
+    protocol = _read(recording, PROTOCOL_FILE, Protocol)
+    return protocol.description if protocol is not None else ""
+
+
 def prediction_in(recording: Recording, believed: Model | None) -> Prediction | None:
     """What the protocol was expected to do on this bench; None where the recording does not say."""
     bench, protocol = bench_in(recording), _read(recording, PROTOCOL_FILE, Protocol)

@@ -18,7 +18,7 @@ from bench.diagnose.next_test import design, write_protocol
 from bench.diagnose.words import lines as diagnosis_lines
 from bench.errors import InputError, PadbenchError
 from bench.fitview import fit_view
-from bench.given import bench_in, model_in, prediction_in
+from bench.given import bench_in, described_in, model_in, prediction_in
 from bench.modelfile import write_model
 from bench.recording import Recording, read_recording
 from bench.recording.schemas import NO_SURFACE
@@ -195,7 +195,7 @@ def _diagnosis_of(
         return None, f"this is a defect of padbench, not of your run: {type(error).__name__}: {error}"
     tell("designing the next test")
     try:
-        found.next_protocol = design(found, measurement, bench_in(recording))
+        found.next_protocol = design(found, measurement, bench_in(recording), described_in(recording))
     except Exception as error:  # likewise
         found.notes.append(f"no next test could be designed: {type(error).__name__}: {error}")
     return found, ""

@@ -77,11 +77,10 @@ def main(args: argparse.Namespace) -> int:
 def _next(result: Diagnosis, recording: Recording, progress: Callable[[str], None]) -> dict[str, Any] | None:
     """The protocol that tells rivals apart, where there are any."""
     from bench.diagnose.next_test import design
-    from bench.given import bench_in
+    from bench.given import bench_in, described_in
 
     progress("designing the next test")
-    bench = bench_in(recording)
-    return design(result, recording.measurement(), bench)
+    return design(result, recording.measurement(), bench_in(recording), described_in(recording))
 
 
 def _write_next(path: Path, result: Diagnosis, *, quiet: bool) -> None:

@@ -12,6 +12,7 @@ from bench.diagnose import diagnose
 from bench.diagnose.data import Data
 from bench.diagnose.next_test import WORTH, design, family, refitted, rival_of, separation, write_protocol
 from bench.diagnose.probing import AIR_mm, Reach, library, motion, together
+from bench.diagnose.words import lines
 from bench.preflight import check
 from bench.protocol import Protocol, load_protocol
 from bench.recording.types import Measurement
@@ -65,6 +66,20 @@ def test_a_bench_file_allows_more_speed_and_limits_the_force():
     slow = design(made_up(), data(), bench.model_copy(update={"limits": bench.limits.model_copy(update={"speed": 3})}))
     assert slow is not None
     assert max(f.step.speed for f in Protocol.model_validate(slow).flatten()) <= 3
+
+
+def test_a_run_that_was_the_test_is_not_proposed_again():
+    d = made_up()
+    content = design(d, data())
+    assert content is not None and not d.doubts
+    for ran in (
+        content["description"],
+        content["description"].replace("friction from backlash", "backlash from friction"),
+    ):
+        again = made_up()
+        assert design(again, data(), ran=ran) is None
+        assert any("the same again tells no more" in line for line in lines(again))
+    assert design(made_up(), data(), ran="Tells friction from cogging: slow ramps.") == content
 
 
 def test_the_rival_tested_against_is_the_one_not_excluded():
