@@ -39,13 +39,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Diagnose and print; status 0 whatever the verdict."""
+    recording = read_data(args, args.data)[0]  # what cannot be read is refused before all else is loaded
+
     from bench.config import load_model
+
+    model = load_model(args.model)
+
     from bench.diagnose import diagnose
     from bench.diagnose.words import HOW_NEXT, lines
     from bench.results import is_air_run
 
-    model = load_model(args.model)
-    recording = read_data(args, args.data)[0]
     if is_air_run(recording) and model.pad.elastic.law != "none":
         cure = "name a model with `elastic: {law: none}`: it tells of the bench alone"
         raise InputError(str(args.data), f"was recorded in air: {args.model} has nothing to press there", cure)

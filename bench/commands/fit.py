@@ -35,10 +35,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Fit and print; status 0 whatever the verdict."""
+    recordings = read_data(args, *args.data)  # what cannot be read is refused before all else is loaded
+
     from bench import identify
     from bench.results import fit_lines, lacking
 
-    recordings = read_data(args, *args.data)
     measurements = pads(recordings)
     options = {name: getattr(args, name) for name in ("starts", "ramps") if getattr(args, name) is not None}
     with status("fitting", quiet=args.json == "-") as progress:

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.special import ndtr
 
 from bench.recording.types import Array
@@ -92,6 +91,8 @@ def giving_way(
 
 def _passed(force_N: Array, tau_s: float) -> Array:
     """The force behind a high-pass of the first order; exact where it is linear between the grid's points."""
+    from scipy.signal import lfilter  # a second to load, for the few recordings that need it
+
     keep = np.exp(-GRID_S / tau_s)
     gain = tau_s / GRID_S * (1.0 - keep)
     return np.asarray(lfilter([gain, -gain], [1.0, -keep], force_N - force_N[0]))
