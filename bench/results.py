@@ -106,6 +106,9 @@ def _analysed(
     believed = believed or model_in(recording)
     prediction = prediction or prediction_in(recording, believed)
     fit, problem = _fit_of(recording, structure)
+    if fit is not None and believed is not None and believed.effects:
+        ids = ", ".join(effect.id for effect in believed.effects)
+        fit.notes.append(f"The pad believed in has effects of the bench ({ids}), and this fit of a pad alone has none.")
     if fit is not None:
         (folder / FIT).write_text(json.dumps(fit.to_json(), indent=2) + "\n", "utf-8")
         write_model(folder / MODEL, fit.model)

@@ -8,6 +8,7 @@ from bench.config import load_model
 from bench.diagnose import diagnose
 from bench.errors import InputError
 from bench.results import analyse
+from sim.model import Model
 from tests.bench.run.benches import SHORT, is_unplugged, merged, once, run
 
 
@@ -37,3 +38,13 @@ def test_a_run_stopped_before_contact_has_no_fit(stopped_in_air):
 def test_a_run_stopped_before_contact_has_no_diagnosis(stopped_in_air):
     with pytest.raises(InputError, match="never in the pad where the force counts"):
         diagnose(stopped_in_air.recording.measurement(), load_model("polyurethane"))
+
+
+def test_a_pad_believed_with_effects_is_said_to_be_fitted_without_them(tmp_path):
+    ran = run(tmp_path, SHORT)
+    plain = load_model("polyurethane")
+    with_frame = Model.from_dict(plain.to_dict() | {"effects": [{"id": "frame_compliance", "compliance": 0.001}]})
+    for believed, said in ((plain, False), (with_frame, True)):
+        fit = analyse(ran.folder, believed=believed).fit
+        assert fit is not None
+        assert any("effects of the bench (frame_compliance)" in note for note in fit.notes) == said
