@@ -54,6 +54,7 @@ AT_HALF_THE_RATE = (
     "second: sample at another rate, and it can be told and taken out"
 )
 NEAR_HALF, HALVES_OF_MAINS = 0.02, (50.0, 60.0, 100.0, 120.0)
+SHAKING = {"inertia", "resonance"}  # what swings with each corner of a motion is heard in it, and is no noise
 RIVALS = 4  # models of the best single causes that are kept
 
 
@@ -216,7 +217,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         notes=list(m.notes),
         doubts=[
             *_units(m, search.believed, path.fits[0], whole[1]),
-            *prepared.said_of_noise,
+            *([] if SHAKING & (known | {c.id for c in causes}) else prepared.said_of_noise),
             *_past(search),
             *_hum_unseen(swing, prepared.sample_s),
             *(stays_bonded(search, path) if causes else []),

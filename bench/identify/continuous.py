@@ -13,7 +13,7 @@ from bench.recording.types import Measurement
 
 from . import asked, notes
 from .laws import Family
-from .noise import Noise, noise_of
+from .noise import Noise, no_louder, noise_of
 from .nuisance import doubtful, moved_mm, with_doubts
 from .parameters import model_dict, parameters
 from .past import with_pasts
@@ -64,7 +64,10 @@ def fit(
     loose = not_told(problem, best, relative, spread.samples) if best.physical else set()
     loose |= set(undetermined)
     loose |= {"nu" + name[1:] for name in loose if name.startswith("c_")}  # a share that may be nothing has no rate
+    heard = noise
+    noise = no_louder(heard, math.sqrt(choice.best.V) * problem.force_N)
     about = notes.findings(problem, noise, best.structure.unilateral)
+    about.notes += [notes.SPARSE] if noise is not heard else []
     if about.still:
         loose -= {name for name in loose if name.startswith("nu_") and relative[name] < CERTAIN}
     loose |= about.lost(found)

@@ -14,6 +14,7 @@ from .motion import glanced, holds, jitter
 
 LEVELS = 500_000  # samples whose resolution is looked at
 HOLD = 3000  # samples of a hold that are looked at
+SPARSE = 0.5  # of the noise found: no fit follows noise so far
 DEPTHS = 12  # bins of depth over which the stiffness is estimated
 
 
@@ -57,6 +58,15 @@ def noise_of(measurements: list[Measurement] | tuple[Measurement, ...]) -> Noise
     through = np.concatenate([stiffness_along(glanced(m)) for m in measurements]) if position > 0 else np.zeros(1)
     floor = float(np.sqrt(force**2 + position**2 * np.mean(through**2)))
     return Noise(force, position, floor, from_holds)
+
+
+def no_louder(noise: Noise, error_N: float) -> Noise:
+    """What was found, as far as it can be: where a simulation of the whole leaves far less, the samples lie too far
+    apart for their noise to be seen beside each other, and it is no more than that error."""
+    if not 0.0 < error_N < SPARSE * noise.floor_N:
+        return noise
+    louder = noise.floor_N / error_N
+    return Noise(noise.force_N / louder, noise.position_mm / louder, error_N, noise.from_holds)
 
 
 def _about_curve(t: Array, y: Array) -> tuple[Array, float]:

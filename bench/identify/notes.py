@@ -18,7 +18,8 @@ from .nuisance import late_s, moved_mm
 from .past import begins_loaded, fitted_past, said_of_past
 from .problem import Problem
 
-LEAST_WAY = 1e-3  # of the depth: less is no motion that a law is told by
+SPARSE = "The samples lie too far apart to tell their noise: it is no more than the error of this fit."
+LEAST_WAY, CLEAR_WAY = 1e-3, 0.05  # of the depth: less is no motion that a law is told by; more is no encoder's noise
 
 LAW, SHARES, RATES = "law", "shares", "rates"
 EVERYTHING = frozenset({LAW, SHARES, RATES})
@@ -85,9 +86,10 @@ def findings(problem: Problem, noise: Noise, unilateral: bool, pasts: bool = Tru
 
 
 def _moves(m: Measurement, noise: Noise) -> bool:
-    """Whether the position does, by more than its noise and a thousandth of the depth, while the force counts."""
+    """Whether the position does while the force counts: clearly, or by more than its noise and next to nothing."""
     position = m.position_at_forces_mm()[m.counted()]
-    return float(np.ptp(position)) > max(8 * noise.position_mm, LEAST_WAY * float(np.abs(position).max(initial=0.0)))
+    way, depth = float(np.ptp(position)), float(np.abs(position).max(initial=0.0))
+    return way > CLEAR_WAY * depth or way > max(8 * noise.position_mm, LEAST_WAY * depth)
 
 
 def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findings:

@@ -146,3 +146,16 @@ def test_unknown_names(options: dict[str, object], words: str) -> None:
         fit(measured(PAD), **options)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="continuous"):
         fit(measured(PAD), method="magic")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_samples_too_far_apart_to_tell_their_noise(seed: int) -> None:
+    """A row a second of presses and returns: what differs from row to row is the motion, and it was taken for noise."""
+    path = Path(-0.5).hold(1)
+    for depth in (1.2, 1.6, 2.0, 2.4, 2.2, 1.9):
+        path = path.to(depth, 1.0).hold(3).to(-0.2, 1.0).hold(1)
+    motion = path.motion()
+    time = np.arange(0, motion.duration_s, 0.95)
+    F = simulate(PAD, motion, time).force_N + 0.006 * np.random.default_rng(seed).standard_normal(len(time))
+    said = notes(measurement(time, motion.position(time), F))
+    assert "too far apart to tell their noise" in said and "ten times" not in said
