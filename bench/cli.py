@@ -135,8 +135,9 @@ def main(argv: list[str] | None = None) -> int:
     if args.command is None:
         top.print_help(sys.stderr)
         return EXIT_BAD_INPUT
+    struck: list[_Ended] = []
     try:
-        with _signals_end_it():
+        with _signals_end_it(struck):
             check_outputs(args)
             status = int(_module(args.command).main(args))
             sys.stdout.flush()  # what cannot be written is said here, not at the interpreter's end
@@ -158,20 +159,32 @@ def main(argv: list[str] | None = None) -> int:
         print(f"padbench {args.command}: {error.filename}: {error.strerror}", file=sys.stderr)
         return EXIT_BAD_INPUT
     except Exception as error:
+        if struck:  # what was under way has made another error of it
+            print(f"padbench {args.command}: stopped by {stop_of(struck[0])}", file=sys.stderr)
+            return EXIT_NO
         return _defect(args.command, error)
 
 
+class _Ended(KeyboardInterrupt):
+    """One of a kind of its own: where the plain one strikes while a text is executed (as a dataclass is made), CPython
+    ends the process by SIGINT, whatever status it returns."""
+
+
 @contextlib.contextmanager
-def _signals_end_it() -> Iterator[None]:
-    """SIGTERM and SIGHUP end a command as Ctrl-C does, with words and status 1; a run itself has them end it softly."""
+def _signals_end_it(struck: list[_Ended]) -> Iterator[None]:
+    """Ctrl-C, SIGTERM and SIGHUP end a command with words and status 1, and are then in `struck`; a run itself has them
+    end it softly."""
 
     def end(number: int, frame: object) -> None:
-        raise KeyboardInterrupt(f"signal {signal.Signals(number).name}")
+        name = signal.Signals(number).name
+        struck.append(_Ended("" if name == "SIGINT" else f"signal {name}"))
+        raise struck[-1]
 
     before = {}
     with contextlib.suppress(ValueError):  # not in the main thread: there somebody else has them
-        for name in ("SIGTERM", "SIGHUP"):
-            if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) == signal.SIG_DFL:
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            usual = (signal.SIG_DFL, signal.default_int_handler)
+            if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) in usual:
                 before[name] = signal.signal(getattr(signal, name), end)
     try:
         yield

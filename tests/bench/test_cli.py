@@ -418,7 +418,7 @@ def test_a_disk_that_is_full_when_the_fit_is_written_says_what_is_kept(padbench,
 def test_a_command_that_is_told_to_end_says_so(tmp_path):
     command = [sys.executable, "-m", "bench.cli", "paper", str(tmp_path / "paper")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
-        while not (tmp_path / "paper").exists() and process.poll() is None:
+        while not (tmp_path / "paper" / "draws.jsonl").exists() and process.poll() is None:
             time.sleep(0.05)
         process.send_signal(signal.SIGTERM)
         said = process.communicate()[0]
