@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import io
 import json
+import os
 import re
 import signal
 import subprocess
@@ -415,11 +416,24 @@ def test_a_disk_that_is_full_when_the_fit_is_written_says_what_is_kept(padbench,
     assert padbench("report", "out").status == 0
 
 
-def test_a_command_that_is_told_to_end_says_so(tmp_path):
-    command = [sys.executable, "-m", "bench.cli", "paper", str(tmp_path / "paper")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
-        while not (tmp_path / "paper" / "draws.jsonl").exists() and process.poll() is None:
-            time.sleep(0.05)
-        process.send_signal(signal.SIGTERM)
-        said = process.communicate()[0]
-    assert process.returncode == 1 and said.rstrip().endswith("padbench paper: stopped by signal SIGTERM")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("turned_into", [None, ValueError])
+def test_a_command_that_is_told_to_end_says_so(padbench, monkeypatch, name, turned_into):
+    """Also where what was under way makes another error of it, as pydantic does of one amid a schema."""
+
+    def struck(args):
+        try:
+            os.kill(os.getpid(), getattr(signal, name))
+            time.sleep(5.0)
+        except KeyboardInterrupt:
+            if turned_into:
+                raise turned_into("within a schema") from None
+            raise
+        return 0
+
+    before = signal.getsignal(getattr(signal, name))
+    monkeypatch.setattr("bench.commands.check.main", struck)
+    said = padbench("check", "quick")
+    whom = "the operator (Ctrl-C)" if name == "SIGINT" else f"signal {name}"
+    assert said.status == 1 and said.err == f"padbench check: stopped by {whom}\n"
+    assert signal.getsignal(getattr(signal, name)) == before
