@@ -431,9 +431,13 @@ def test_a_command_that_is_told_to_end_says_so(padbench, monkeypatch, name, turn
             raise
         return 0
 
-    before = signal.getsignal(getattr(signal, name))
+    usual = signal.default_int_handler if name == "SIGINT" else signal.SIG_DFL
+    before = signal.signal(getattr(signal, name), usual)  # whoever started the tests may have had it ignored (nohup)
     monkeypatch.setattr("bench.commands.check.main", struck)
-    said = padbench("check", "quick")
+    try:
+        said = padbench("check", "quick")
+        assert signal.getsignal(getattr(signal, name)) == usual
+    finally:
+        signal.signal(getattr(signal, name), before)
     whom = "the operator (Ctrl-C)" if name == "SIGINT" else f"signal {name}"
     assert said.status == 1 and said.err == f"padbench check: stopped by {whom}\n"
-    assert signal.getsignal(getattr(signal, name)) == before
