@@ -146,8 +146,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"padbench {args.command}: {error}", file=sys.stderr)
         return error.status
     except KeyboardInterrupt as stop:
-        print(f"padbench {args.command}: stopped by {stop_of(stop)}", file=sys.stderr)
-        return EXIT_NO
+        return _stopped(args.command, stop)
     except BrokenPipeError:
         _give_up_output()
         return EXIT_NO
@@ -160,9 +159,13 @@ def main(argv: list[str] | None = None) -> int:
         return EXIT_BAD_INPUT
     except Exception as error:
         if struck:  # what was under way has made another error of it
-            print(f"padbench {args.command}: stopped by {stop_of(struck[0])}", file=sys.stderr)
-            return EXIT_NO
+            return _stopped(args.command, struck[0])
         return _defect(args.command, error)
+
+
+def _stopped(command: str, stop: KeyboardInterrupt) -> int:
+    print(f"padbench {command}: stopped by {stop_of(stop)}", file=sys.stderr)
+    return EXIT_NO
 
 
 class _Ended(KeyboardInterrupt):
@@ -181,9 +184,9 @@ def _signals_end_it(struck: list[_Ended]) -> Iterator[None]:
         raise struck[-1]
 
     before = {}
+    usual = (signal.SIG_DFL, signal.default_int_handler)
     with contextlib.suppress(ValueError):  # not in the main thread: there somebody else has them
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-            usual = (signal.SIG_DFL, signal.default_int_handler)
             if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) in usual:
                 before[name] = signal.signal(getattr(signal, name), end)
     try:

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from bench.diagnose import Diagnosis
     from bench.identify import FitResult
     from bench.predict import Prediction
+    from bench.recording.types import Measurement
 
 
 DIAGNOSIS = "diagnosis.json"
@@ -198,10 +199,15 @@ def _diagnosis_of(
         return None, f"this is a defect of padbench, not of your run: {type(error).__name__}: {error}"
     tell("designing the next test")
     try:
-        found.next_protocol = design(found, measurement, bench_in(recording), described_in(recording))
+        found.next_protocol = next_test(found, recording, measurement)
     except Exception as error:  # likewise
         found.notes.append(f"no next test could be designed: {type(error).__name__}: {error}")
     return found, ""
+
+
+def next_test(found: Diagnosis, recording: Recording, measurement: Measurement) -> dict[str, Any] | None:
+    """The protocol that tells rivals apart on the recording's bench, where there are any and it was not that one."""
+    return design(found, measurement, bench_in(recording), described_in(recording))
 
 
 def _planned(recording: Recording, prediction: Prediction | None) -> PlannedCurve | None:

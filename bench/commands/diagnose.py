@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bench.commands.options import add_columns, read_data, status
 from bench.commands.outputs import add_json, add_output
@@ -14,7 +13,6 @@ from bench.errors import EXIT_DONE, InputError
 
 if TYPE_CHECKING:
     from bench.diagnose import Diagnosis
-    from bench.recording import Recording
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +45,7 @@ def main(args: argparse.Namespace) -> int:
 
     from bench.diagnose import diagnose
     from bench.diagnose.words import HOW_NEXT, lines
-    from bench.results import is_air_run
+    from bench.results import is_air_run, next_test
 
     if is_air_run(recording) and model.pad.elastic.law != "none":
         cure = "name a model with `elastic: {law: none}`: it tells of the bench alone"
@@ -55,7 +53,8 @@ def main(args: argparse.Namespace) -> int:
     measurement = recording.measurement()
     with status("diagnosing", quiet=args.json == "-") as progress:
         result = diagnose(measurement, model, progress)
-        result.next_protocol = _next(result, recording, progress)
+        progress("designing the next test")
+        result.next_protocol = next_test(result, recording, measurement)
     text = json.dumps(result.to_json(), indent=2, allow_nan=False)
     if args.json == "-":
         print(text)
@@ -75,15 +74,6 @@ def main(args: argparse.Namespace) -> int:
 
         write_diagnosis(args.report, result, f"Diagnosis · {args.data.name} and {Path(args.model).name}")
     return EXIT_DONE
-
-
-def _next(result: Diagnosis, recording: Recording, progress: Callable[[str], None]) -> dict[str, Any] | None:
-    """The protocol that tells rivals apart, where there are any."""
-    from bench.diagnose.next_test import design
-    from bench.given import bench_in, described_in
-
-    progress("designing the next test")
-    return design(result, recording.measurement(), bench_in(recording), described_in(recording))
 
 
 def _write_next(path: Path, result: Diagnosis, *, quiet: bool) -> None:

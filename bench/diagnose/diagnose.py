@@ -26,6 +26,7 @@ from .channel_causes import by_themselves, channel_causes, joined
 from .contact import stays_bonded
 from .data import Prepared, prepare
 from .evidence import SPEAKS, beyond_limit, held_back
+from .hum import hidden
 from .needed import Needed, needed
 from .noise import SETTLED_S
 from .noiseless import without_noise
@@ -49,11 +50,6 @@ TOLD = 0.002  # of what the belief leaves beyond the noise: what a fault of the 
 NO_NOISE = 0.1  # of the noise power: what turns its sign with each sample is taken for some times as much noise
 ENDED_EARLY = "the search ended with its work done: what is left may have a further cause, for which it did not look"
 FEW_TO_TELL = "only {} force samples count in these data: too few to tell causes by"
-AT_HALF_THE_RATE = (
-    "it swings at about half the rate of the samples, as hum of the mains does where they are taken {:.4g} times a "
-    "second: sample at another rate, and it can be told and taken out"
-)
-NEAR_HALF, HALVES_OF_MAINS = 0.02, (50.0, 60.0, 100.0, 120.0)
 SHAKING = {"inertia", "resonance"}  # what swings with each corner of a motion is heard in it, and is no noise
 RIVALS = 4  # models of the best single causes that are kept
 
@@ -151,15 +147,6 @@ def _units(m: Measurement, believed: Structure, refitted: Fit, ended: Fit) -> li
     return said if doubts(m, believed.pad.pad, ended.pad) else []
 
 
-def _hum_unseen(swing: Swing | None, sample_s: float) -> list[str]:
-    """What to say of a swing at half the samples' rate, where that is the frequency of the mains or a harmonic."""
-    half_Hz = 0.5 / sample_s
-    mains = any(abs(half_Hz / f - 1.0) < NEAR_HALF for f in HALVES_OF_MAINS)
-    if swing is None or not mains or abs(swing.frequency_Hz / half_Hz - 1.0) > NEAR_HALF:
-        return []
-    return [AT_HALF_THE_RATE.format(1.0 / sample_s)]
-
-
 def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> Diagnosis:
     prepared, flags, search, path = ended.prepared, ended.flags, ended.search, ended.path
     whole, squares, excess, floor = ended.needed.whole, ended.needed.squares, ended.needed.excess, ended.needed.floor_N
@@ -219,7 +206,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
             *_units(m, search.believed, path.fits[0], whole[1]),
             *([] if SHAKING & (known | {c.id for c in causes}) else prepared.said_of_noise),
             *_past(search),
-            *_hum_unseen(swing, prepared.sample_s),
+            *(hidden(swing.frequency_Hz, prepared.sample_s) if swing is not None else []),
             *(stays_bonded(search, path) if causes else []),
             *([ENDED_EARLY] if path.cut_short else []),
             *([FEW_TO_TELL.format(counted)] if (counted := np.count_nonzero(full.weight)) < FEWEST else []),

@@ -26,6 +26,11 @@ LOWEST_HZ = 8.0
 GRIDS_HZ, MULTIPLES = (50.0, 60.0), (1, 2, 3)
 OFF, STEADY = 0.05, 0.003  # of its frequency, by which a grid may be off, and by which a large one is
 RARER = 1e-3  # of a grid's frequency, by which it must be nearer for each multiple: twice what a grid is off by, mostly
+NEAR_HALF = 0.02  # of half the samples' rate
+AT_HALF_THE_RATE = (
+    "it swings at about half the rate of the samples, as hum of the mains does where they are taken {:.4g} times a "
+    "second: sample at another rate, and it can be told and taken out"
+)
 LEVEL = 1e-5  # of a line by chance, over all frequencies
 LEAST_SHARE = 0.002  # of the noise power
 TOLD = 15.0  # times the noise power per sample: what a further number of the line must take
@@ -280,13 +285,22 @@ def _step(stamp_s: Array) -> float:
     return float(np.mean(steps[steps < 1.5 * np.median(steps)]))
 
 
-def _of_grids(seen_Hz: float, rate_Hz: float) -> dict[float, float]:
-    """Frequencies of the mains that look like this one, and how far off a grid's they are, as a share. Folded, any
-    frequency is near one that a grid might have: there it must be one that a large grid has."""
+def _of_grids(seen_Hz: float, rate_Hz: float) -> list[float]:
+    """Frequencies of the mains that look like this one. Folded, any frequency is near one that a grid might have: there
+    it must be one that a large grid has."""
     count = int(MULTIPLES[-1] * max(GRIDS_HZ) / rate_Hz) + 2
     every = [abs(k * rate_Hz + sign * seen_Hz) for k in range(count) for sign in (1.0, -1.0)]
     far = {f: min(abs(f / (n * grid) - 1.0) for n in MULTIPLES for grid in GRIDS_HZ) for f in every}
-    return {f: off for f, off in far.items() if off <= (OFF if f <= 0.5 * rate_Hz else STEADY)}
+    return [f for f, off in far.items() if off <= (OFF if f <= 0.5 * rate_Hz else STEADY)]
+
+
+def hidden(swing_Hz: float, sample_s: float) -> list[str]:
+    """What to say of a swing at half the samples' rate, where that is the frequency of the mains or its second."""
+    half_Hz = 0.5 / sample_s
+    mains = any(abs(half_Hz / (n * grid) - 1.0) < NEAR_HALF for n in (1, 2) for grid in GRIDS_HZ)
+    if not mains or abs(swing_Hz / half_Hz - 1.0) > NEAR_HALF:
+        return []
+    return [AT_HALF_THE_RATE.format(1.0 / sample_s)]
 
 
 def _unfolded(seen_Hz: float, rate_Hz: float) -> list[float]:

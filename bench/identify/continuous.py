@@ -67,7 +67,7 @@ def fit(
     heard = noise
     noise = no_louder(heard, math.sqrt(choice.best.V) * problem.force_N)
     about = notes.findings(problem, noise, best.structure.unilateral)
-    about.notes += [notes.SPARSE] if noise is not heard else []
+    about.notes += [notes.TOO_FAR_APART] if noise is not heard else []
     if about.still:
         loose -= {name for name in loose if name.startswith("nu_") and relative[name] < CERTAIN}
     loose |= about.lost(found)

@@ -18,7 +18,7 @@ from .nuisance import late_s, moved_mm
 from .past import begins_loaded, fitted_past, said_of_past
 from .problem import Problem
 
-SPARSE = "The samples lie too far apart to tell their noise: it is no more than the error of this fit."
+TOO_FAR_APART = "The samples lie too far apart to tell their noise: it is no more than the error of this fit."
 LEAST_WAY, CLEAR_WAY = 1e-3, 0.05  # of the depth: less is no motion that a law is told by; more is no encoder's noise
 
 LAW, SHARES, RATES = "law", "shares", "rates"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -56,15 +57,14 @@ def test_standard_errors_grow_by_what_late_stamps_move_the_numbers() -> None:
 
 
 def test_doubtful_stamps_are_estimated_with_the_pad() -> None:
-    given: dict[str, object] = {"law": "exponential", "order": 2, "contact": "unilateral"}
+    fitted_as = functools.partial(fit, law="exponential", order=2, contact="unilateral")
     deviations, taken_as_they_are = [], []
     for seed in range(8):
         rng = np.random.default_rng(seed)
         m = measured(rng)
         late_s = LATE_S * float(rng.standard_normal())
         m = replace(m, position_time_s=m.position_time_s - late_s)  # measured later than stamped
-        found = fit(replace(m, stamp_std_s=LATE_S), **given)  # type: ignore[arg-type]
-        certain = fit(m, **given)  # type: ignore[arg-type]
+        found, certain = fitted_as(replace(m, stamp_std_s=LATE_S)), fitted_as(m)
         for fitted, z in ((found, deviations), (certain, taken_as_they_are)):
             share = fitted.parameters["c_1"]
             z.append((share.value - 0.25) / share.std)
