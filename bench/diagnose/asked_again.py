@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bench.identify.motion import holds
 from bench.position_noise import resolution
 from bench.recording.types import Measurement
+from bench.repeats import runs
 
 from .channel import FEW, Faults, far, not_of_the_motion, of_the_model, resting, standing_off, strays
 from .data import Prepared, prepare
@@ -18,7 +19,6 @@ from .path import Path
 from .pulses import pulses
 from .refit import Fit, force_at, onto
 from .search import Search
-from .stuck import runs
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -14,9 +14,10 @@ from scipy.stats import t as student_t
 from bench.identify.motion import holds
 from bench.position_noise import resolution
 from bench.recording.types import Measurement
+from bench.repeats import copies, runs
 
 from .coarse import coarse_repeats
-from .stuck import CHANCE, FEW_REPEATS, LEAPS, equal_by_chance, no_accident, repeated, runs, slowed
+from .stuck import CHANCE, FEW_REPEATS, LEAPS, equal_by_chance, no_accident, repeated, slowed
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -103,7 +104,9 @@ def faults(force_N: Array) -> Faults:
         saturated, bent = saturated | ended, bent & ~(saturated | ended)
     # just below a ceiling that is not sharp a channel repeats itself too
     ended = saturated if limit is None else saturated | (force_N * np.sign(limit) > NEARLY * abs(limit))
-    stuck = repeated(force_N, ended) | slowed(force_N, ended)
+    stuck = copies(force_N) & ~ended
+    if not stuck.any():
+        stuck = repeated(force_N, ended) | slowed(force_N, ended)
     halted, share = coarse_repeats(force_N, ended | stuck)
     if not stuck.any():
         stuck = halted

@@ -23,8 +23,8 @@ from .data import Data
 from .numbers import PadNumbers, Structure, cause_of
 from .probing import AIR_mm, Block, Motion, Reach, library, motion, together
 from .refit import refit
-from .result import CauseFound, Diagnosis
-from .words import in_air, name_of
+from .result import Diagnosis
+from .words import in_air, in_doubt, name_of
 
 if TYPE_CHECKING:
     from bench.config import Bench
@@ -48,8 +48,6 @@ SETTLED = 0.01
 STEPS = 40
 STRONGER = 1.5
 """Times the greatest force of the data that a test may expect: a fast way to the same depth is felt more."""
-DOUBTED = 0.9
-"""Confidence under which the strongest rival is tested against, even if it is excluded."""
 ACCELERATION_mm_s2 = 3000.0
 """Where no bench file says."""
 FAST_mm_s = 80.0
@@ -95,19 +93,13 @@ def rival_of(d: Diagnosis) -> Rival | None:
     models = dict(d.rivals)
     own = [c.id for c in d.causes]
     for cause in sorted(d.causes, key=lambda c: c.confidence):
-        for other in _in_doubt(cause):
+        for other in (a.id for a in in_doubt(cause)):
             if other not in models or other in own:
                 continue
             first = d.model_dict if len(own) == 1 else models.get(cause.id)
             if first is not None:
                 return Rival(cause.id, other, (Model.from_dict(first), Model.from_dict(models[other])))
     return None
-
-
-def _in_doubt(cause: CauseFound) -> list[str]:
-    near = sorted(cause.alternatives, key=lambda a: a.delta_chi2)
-    still = [a.id for a in near if not a.excluded]
-    return still or ([near[0].id] if near and cause.confidence < DOUBTED else [])
 
 
 def _reach(m: Measurement, bench: Bench | None) -> Reach:

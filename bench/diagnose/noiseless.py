@@ -8,10 +8,10 @@ import numpy as np
 
 from bench.position_noise import resolution
 from bench.recording.types import Measurement
+from bench.repeats import runs
 
 from .channel import Faults, resting
 from .noise import force_noise, least_N
-from .stuck import runs
 
 CRESTS, AT_A_CREST = 12, 4  # runs, and samples in one, that may be equal as a force turns
 

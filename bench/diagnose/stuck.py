@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm, poisson
 
 from bench.position_noise import resolution
+from bench.repeats import runs
 
 from .coarse import noise_steps
 
@@ -23,12 +24,6 @@ STANDS = 0.5  # share of equal pairs beyond which noise is less than half a step
 LEAPS = 3  # steps by which what has stuck in such a channel catches up, at the least
 DIGITS, WHOLE = 12, 1e-3  # decimal places that are looked for; and how far off a whole number of them is one
 SLOWED = (2, 3, 4)  # samples that a channel says one value for, when it is for a while that much slower
-
-
-def runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """(first sample, length) of every run of equal values."""
-    first = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
-    return first, np.diff(np.concatenate([first, [len(values)]]))
 
 
 def slowed(force: Array, but: Mask) -> Mask:

@@ -42,6 +42,8 @@ NAMES = {
 
 SHOWN = 6
 """Numbers of one cause that a terminal shows."""
+DOUBTED = 0.9
+"""Confidence under which the strongest rival stays in doubt, even if it is excluded."""
 NEAR = 0.5
 """Share of the gain from which an excluded rival is worth a word."""
 UNTOLD = 0.7
@@ -188,12 +190,24 @@ def doubtful(cause: CauseFound) -> list[Alternative]:
     return [a for a in cause.alternatives if not a.excluded]
 
 
+def in_doubt(cause: CauseFound) -> list[Alternative]:
+    """What a further test should tell from a cause, nearest first: what is not excluded; else, where the name is little
+    sure, what comes nearest."""
+    near = sorted(cause.alternatives, key=lambda a: a.delta_chi2)
+    still = [a for a in near if not a.excluded]
+    return still or (near[:1] if cause.confidence < DOUBTED else [])
+
+
 def rivals(cause: CauseFound) -> str:
     """What else it could be, in one sentence; empty where nothing comes near."""
     open_ = doubtful(cause)
     if open_:
         said = ", ".join(f"{name_of(a.id)} ({gain(a)} of the gain)" for a in open_)
         return f"these data cannot exclude: {said}"
+    nearest = in_doubt(cause)
+    if nearest:
+        said = f"{name_of(nearest[0].id)} ({gain(nearest[0])} of the gain)"
+        return f"likeliest beside it, though these data speak against it: {said}"
     near = [a for a in cause.alternatives if a.gain_share >= NEAR]
     if near:
         return f"excluded, though near: {name_of(near[0].id)} ({percent(near[0].gain_share)} of the gain)"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from bench.errors import InputError
 from bench.motion_between import motion_between
 from bench.recording.types import Measurement
+from bench.repeats import copies
 from sim.grid import union
 
 from ._kernel import Array
@@ -235,10 +236,24 @@ def _checked(m: Measurement, notes: list[str]) -> Measurement:
         lost = int((~inside).sum())
         notes.append(f"{m.name}: {lost} force samples lie outside the times of the position and were left out.")
         m = replace(m, force_time_s=m.force_time_s[inside], force_N=m.force_N[inside])
+    m = _converted(m, notes)
     counted = int(_counted(m).sum())
     if counted < 20:
         raise InputError(m.name, f"only {counted} force samples can be fitted", "At least 20 are needed.")
     return m
+
+
+def _converted(m: Measurement, notes: list[str]) -> Measurement:
+    """Without force samples that only repeat the one before, where a channel is read more often than it converts."""
+    again = copies(m.force_N)
+    if not again.any():
+        return m
+    every = round(len(again) / np.count_nonzero(~again), 1)
+    notes.append(
+        f"{m.name}: The force is a new one every {every:g} samples only: those between, which repeat it, were left out."
+        " (Is the load cell read more often than it converts?)"
+    )
+    return replace(m, force_time_s=m.force_time_s[~again], force_N=m.force_N[~again])
 
 
 def _run(

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from bench.diagnose.result import Number
-from bench.diagnose.words import NAMES, headline, lines, name_of, percent, untold, verdict
+from bench.diagnose.words import NAMES, headline, in_doubt, lines, name_of, percent, untold, verdict
 from bench.report.diagnosis import diagnosis_page
 from sim.effects import all_effects
 from tests.bench.diagnose.small import PAD, made_up
@@ -64,10 +64,21 @@ def test_numbers_that_the_data_hardly_tell_are_said_to_be_such():
 def test_excluded_rivals_are_said_to_be_excluded_and_only_near_ones():
     d = made_up()
     near = replace(d.causes[0].alternatives[0], excluded=True)
-    said = "\n".join(lines(made_up(causes=[replace(d.causes[0], alternatives=[near])])))
+    sure = replace(d.causes[0], confidence=0.95)
+    said = "\n".join(lines(made_up(causes=[replace(sure, alternatives=[near])])))
     assert "excluded, though near: backlash" in said and "cannot exclude" not in said
     far = replace(near, gain_share=0.1)
-    assert "backlash" not in "\n".join(lines(made_up(causes=[replace(d.causes[0], alternatives=[far])])))
+    assert "backlash" not in "\n".join(lines(made_up(causes=[replace(sure, alternatives=[far])])))
+
+
+def test_what_the_next_test_is_about_is_not_said_to_be_excluded():
+    d = made_up()
+    near = replace(d.causes[0].alternatives[0], excluded=True, gain_share=0.1)
+    cause = replace(d.causes[0], alternatives=[near], confidence=0.5)
+    said = "\n".join(lines(made_up(causes=[cause])))
+    assert in_doubt(cause) == [near]
+    assert "speak against it: backlash (10 % of the gain)" in said and "excluded" not in said
+    assert in_doubt(replace(cause, confidence=0.95)) == []
 
 
 def test_a_name_that_something_else_than_its_rivals_keeps_doubtful_says_what():

@@ -1,0 +1,54 @@
+"""Force samples that say again what was said before: runs of one value, and channels that are read more often than
+they convert."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.position_noise import resolution
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MANY = 30  # new values that leap, by which it is told
+LEAP = 1.5  # steps of the channel's digits: a slow move through coarse ones goes by single steps
+RARE = 0.01  # of those, that may be followed by another too soon: strays, lost conversions
+PART = 0.1  # of all samples that such values stand for: else they are moves between rests
+
+
+def runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """(first sample, length) of every run of equal values."""
+    first = np.flatnonzero(np.concatenate([[True], values[1:] != values[:-1]]))
+    return first, np.diff(np.concatenate([first, [len(values)]]))
+
+
+def rows_per_conversion(force: Array) -> int:
+    """For how many samples each new value of a channel (m,) stands at the least; 1: none is known to stand longer.
+
+    A converter slower than the rows that are written of it leaves runs of equal values, none of them shorter than what
+    it takes; noise, digits and samples that stick by chance leave short ones too.
+    """
+    first, length = runs(force)
+    if len(first) < MANY + 2:
+        return 1
+    change = np.abs(np.diff(force[first]))[:-1]  # into every run but the first and the last, which were cut
+    leaps = change > LEAP * resolution(force)
+    if np.count_nonzero(leaps) < MANY:
+        return 1
+    rows = int(np.quantile(length[1:-1][leaps], RARE, method="lower"))
+    return rows if rows * np.count_nonzero(leaps) >= PART * len(force) else 1
+
+
+def copies(force: Array) -> Mask:
+    """Which samples (m,) of a channel that is read more often than it converts only repeat the one before; where it
+    stands longer than it takes, one each so often counts as new, with the same value. None, if it is no such channel.
+    """
+    rows = rows_per_conversion(force)
+    if rows == 1:
+        return np.zeros(len(force), dtype=bool)
+    first, length = runs(force)
+    single = length[(length >= rows) & (length <= rows + 1)]
+    every = rows + int(np.mean(single) > rows + RARE)  # between two whole numbers: the later one holds a new value
+    since = np.arange(len(force)) - np.repeat(first, length)
+    return np.asarray(since % every != 0)

@@ -1,0 +1,99 @@
+"""Load cells that convert more slowly than they are read: told from noise, digits and samples that stick by chance."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bench import identify
+from bench.diagnose import diagnose
+from bench.recording.types import Measurement
+from bench.repeats import copies, rows_per_conversion
+from sim.model import Model
+from tests.truth.laws import Power
+from tests.truth.motion import staircase
+from tests.truth.pad import Pad, simulate
+
+ROW_s = 0.0125
+PAD = Pad(Power(2.7, 0.5), (0.3, 0.12), (2.5, 0.2))
+BELIEVED = Pad(Power(2.5, 0.5), (0.26, 0.13), (2.8, 0.18))
+SEEDS = range(20)
+
+
+@functools.cache
+def clean(up_mm_s: float = 8.0) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """(times, positions, forces without noise) of a staircase, up and down twice."""
+    motion = staircase([0.8, 1.6, 2.4, 1.6, 0.8, 0.0] * 2, up_mm_s, 3.0)
+    t = np.arange(0.0, motion.duration_s, ROW_s)
+    return t, np.asarray(motion.position(t)), simulate(PAD, motion, t).force_N
+
+
+def held(rows: float, seed: int, digit_N: float = 0.002) -> tuple[Measurement, NDArray[np.bool_]]:
+    """(what is logged of a cell that converts every so many rows, which rows only repeat), with 10 mN of noise."""
+    t, x, force = clean()
+    rng = np.random.default_rng(seed)
+    converted = np.floor((np.arange(len(t)) + rng.uniform(0.0, rows)) / rows).astype(int)
+    again = np.concatenate([[False], np.diff(converted) == 0])
+    new = np.flatnonzero(~again)
+    said = np.rint((force + 0.01 * rng.standard_normal(len(t))) / digit_N) * digit_N
+    f = said[new[np.cumsum(~again) - 1]]
+    return Measurement("held", t, x + 1e-4 * rng.standard_normal(len(t)), t, f), again
+
+
+@pytest.mark.parametrize("rows", [2.0, 2.5, 3.0, 8.0, 9.7])
+@pytest.mark.parametrize("digit_N", [1e-6, 0.002, 0.008])
+def test_a_slow_converter_is_told(rows: float, digit_N: float) -> None:
+    by_chance = digit_N / (2.0 * np.sqrt(np.pi) * 0.01)  # that a new value is the one before, which nobody can tell
+    for seed in SEEDS:
+        m, again = held(rows, seed, digit_N=digit_N)
+        assert rows_per_conversion(m.force_N) == int(rows)
+        found = copies(m.force_N)
+        assert np.mean(again[found]) >= 1.0 - by_chance / (rows - 1.0)
+        assert np.sum(found & again) >= (1.0 - by_chance / (rows - 1.0)) * np.sum(again)
+
+
+@pytest.mark.parametrize("noise_N", [0.0, 0.0005, 0.002, 0.006, 0.02])
+@pytest.mark.parametrize("up_mm_s", [0.05, 0.8, 30.0])
+def test_digits_and_noise_are_no_slow_converter(noise_N: float, up_mm_s: float) -> None:
+    _, _, force = clean(up_mm_s)
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        said = np.rint((force + noise_N * rng.standard_normal(len(force))) / 0.002) * 0.002
+        assert not copies(said).any()
+        assert not copies(said[::40]).any()
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3, 0.6, 0.875])
+def test_samples_that_stick_by_chance_are_no_slow_converter(share: float) -> None:
+    _, _, force = clean()
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        said = np.rint((force + 0.01 * rng.standard_normal(len(force))) / 0.002) * 0.002
+        sticks = rng.random(len(said)) < share
+        sticks[0] = False
+        assert not copies(said[np.flatnonzero(~sticks)[np.cumsum(~sticks) - 1]]).any()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_fit_leaves_the_copies_out_and_says_so(seed: int) -> None:
+    m, again = held(8.0, seed)
+    fitted = identify.fit(m)
+    assert fitted.law == "power" and fitted.order == 2
+    assert np.sqrt(fitted.V) < 1.1 * 0.01
+    for name, true in {"p": 2.7, "q": 0.5, "nu_1": 2.5, "nu_2": 0.2, "c_1": 0.3, "c_2": 0.12}.items():
+        assert abs(fitted.parameters[name].value - true) < 4.5 * fitted.parameters[name].std, name
+    assert any("a new one every 8 samples" in note for note in fitted.notes)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_diagnosis_names_them_and_nothing_else(seed: int) -> None:
+    m, again = held(8.0, seed)
+    d = diagnose(m, Model.from_dict(BELIEVED.model()))
+    assert d.verdict == "explained"
+    assert [cause.id for cause in d.causes] == ["stuck_samples"]
+    fraction = d.causes[0].parameters["fraction"]
+    assert abs(fraction.value - float(np.mean(again))) < 2.0 * fraction.std
+    assert d.held_out_after < 1.15 * 0.01
