@@ -6,6 +6,7 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 from functools import cached_property
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -22,7 +23,8 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from sim.effects import Active, Effect, Form, all_effects
+from sim.effects import Active, Effect, Form, Parameter, all_effects
+from sim.effects.elastic_law import MOST_POINTS
 from sim.elastic import ElasticLaw, Exponential, NoPad, Polynomial, Power, Spline
 from sim.pad import Cascade, Pad, Plant
 from sim.relaxation import Relaxation
@@ -230,8 +232,14 @@ def _form_schema(effect: Effect, form: Form) -> dict[str, Any]:
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
 
 
+def _unit(parameter: Parameter, before: str = " ") -> str:
+    """The unit behind some word; nothing for a number without unit."""
+    return "" if parameter.unit == "1" else before + parameter.unit
+
+
 def _as_form(fields: dict[str, Any]) -> dict[str, Any]:
-    """An elastic law written as in a pad, `law: polynomial, alpha: […]`, as the form of that name and its numbers."""
+    """An elastic law written as in a pad, `law: polynomial, alpha: […]` or `law: spline, delta_mm: […], force_N: […]`,
+    as the form that has it and its numbers."""
     law, alpha = fields.pop("law", None), fields.get("alpha")
     if law is not None:
         if fields.get("form", law) != law:
@@ -242,6 +250,14 @@ def _as_form(fields: dict[str, Any]) -> dict[str, Any]:
         fields["form"] = f"polynomial_{degree}"
         del fields["alpha"]
         fields |= {f"alpha_{i}": alpha[i] if i < len(alpha) else 0.0 for i in range(degree + 1)}
+    if fields.get("form") == "spline" and {"delta_mm", "force_N"} & set(fields):
+        curve = SplineSpec.model_validate({"law": "spline", **{k: v for k, v in fields.items() if k != "form"}})
+        points = [(0.0, 0.0), *((d, f) for d, f in zip(curve.delta_mm, curve.force_N, strict=True) if d > 0.0)]
+        if len(points) > MOST_POINTS + 1:
+            raise ValueError(f"elastic_law takes {MOST_POINTS} points at the most, not {len(points) - 1}")
+        fields = {"form": "points"}
+        for i, (before, point) in enumerate(pairwise(points), start=1):
+            fields |= {f"step_{i}": point[0] - before[0], f"rise_{i}": point[1] - before[1]}
     return fields
 
 
@@ -283,16 +299,14 @@ class EffectEntry(_Part):
             if name not in known:
                 raise ValueError(f"{self.id} ({self.form}) has no parameter {name!r}{nearest(name, known)}")
             parameter = known[name]
-            if quantity.unit is not None and quantity.unit != parameter.unit:
+            if quantity.unit is not None and quantity.unit.replace("·", "*") != parameter.unit:
                 raise ValueError(f"{self.id}: {name} is in {parameter.unit}, not {quantity.unit}")
             if not parameter.lower <= quantity.value <= parameter.upper:
-                raise ValueError(
-                    f"{self.id}: {name} must be from {parameter.lower:g} to {parameter.upper:g} {parameter.unit}, "
-                    f"not {quantity.value:g}"
-                )
+                bounds = f"from {parameter.lower:g} to {parameter.upper:g}{_unit(parameter)}"
+                raise ValueError(f"{self.id}: {name} must be {bounds}, not {quantity.value:g}")
         for parameter in self._form.parameters:
             if parameter.required and parameter.name not in self.parameters:
-                raise ValueError(f"{self.id} ({self.form}) needs {parameter.name!r} in {parameter.unit}")
+                raise ValueError(f"{self.id} ({self.form}) needs {parameter.name!r}{_unit(parameter, ' in ')}")
         return self
 
     @property

@@ -8,8 +8,10 @@ The believed law is replaced as a whole: the forms are those of sim/elastic with
   `reach` is a choice and not fitted: the greatest depth of the data. `graded_spline` has nine points at depths that go
   with the square, closer near the surface: a pad that is touched at a point, as by a sphere, bends most there.
   `fine_spline` and `fine_graded_spline` have fifteen.
+- `points`: the same curve through (0, 0) and up to twenty points where a file has them; for simulation.
 
-Files may say `law:` for `form:`, and for polynomials `law: polynomial, alpha: [α_0, α_1, …]`.
+Files may say `law:` for `form:`, for polynomials `law: polynomial, alpha: [α_0, α_1, …]`, and for points `law: spline,
+delta_mm: […], force_N: […]`.
 
 Reference: L. R. G. Treloar, The Physics of Rubber Elasticity, 3rd ed., Oxford, 1975; for the spline
 F. N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5, 1984, 300–304.
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 KNOTS = 7
 GRADED_KNOTS = 9
 FINE_KNOTS = 15
+MOST_POINTS = 20
 
 
 def _exponential(pad: Pad, values: Mapping[str, float]) -> Pad:
@@ -82,6 +85,31 @@ def _spline_form(name: str, what: str, knots: int, sought: bool, grading: int = 
         for i, (before, part) in enumerate(pairwise([0.0, *parts]), start=1)
     ]
     return Form(name, what, (reach, *rises), amend=_spline(parts), sought=sought)
+
+
+def _points(pad: Pad, values: Mapping[str, float]) -> Pad:
+    from sim.elastic import Spline
+
+    there = [i for i in range(1, MOST_POINTS + 1) if values[f"step_{i}"] > 0.0]
+    depths, forces = (tuple(accumulate(values[f"{name}_{i}"] for i in there)) for name in ("step", "rise"))
+    return replace(pad, law=Spline(depths, forces))
+
+
+def _points_form() -> Form:
+    each = range(1, MOST_POINTS + 1)
+    steps = [
+        Parameter(f"step_{i}", "mm", 0.0, 1e3, 0.2, f"depth of point {i} less that of the one before; 0: there is none",
+                  default=0.0, fixed=True)
+        for i in each[1:]
+    ]  # fmt: skip
+    rises = [
+        Parameter(f"rise_{i}", "N", 0.0, 1e5, 0.5, f"force at point {i} less that at the one before", default=0.0,
+                  fixed=True)
+        for i in each
+    ]  # fmt: skip
+    first = Parameter("step_1", "mm", 1e-6, 1e3, 0.2, "depth of point 1", required=True, fixed=True)
+    what = f"monotone curve through up to {MOST_POINTS} points given"
+    return Form("points", what, (first, *steps, *rises), amend=_points, sought=False)
 
 
 def _polynomial_form(degree: int) -> Form:
@@ -138,5 +166,6 @@ EFFECT = Effect(
         _spline_form(
             "fine_graded_spline", "monotone curve through fifteen points, closer near the surface", FINE_KNOTS, False, 2
         ),
+        _points_form(),
     ),
 )

@@ -230,12 +230,28 @@ class TestFiles:
             ({"law": "power", "p": 3.0, "q": 0.5}, "power"),
             ({"law": "polynomial", "alpha": [0.1, 1.0, 0.5, 0.2]}, "polynomial_3"),
             ({"law": "polynomial", "alpha": [0.0, 2.0]}, "polynomial_2"),
+            ({"law": "spline", "delta_mm": [0.0, 0.7, 2.0], "force_N": [0.0, 1.0, 4.0]}, "points"),
+            ({"law": "spline", "delta_mm": [0.4, 0.7, 1.9], "force_N": [0.2, 1.0, 1.0]}, "points"),
         ):
             model = Model.from_dict({"pad": pad, "effects": [{"id": "elastic_law", **law}]})
             assert model.effects[0].form == form
             other = Model.from_dict({"pad": {"elastic": law}})
             x = np.linspace(-0.5, 2.0, 30)
             assert_allclose(model.simulate(x, x), other.simulate(x, x), rtol=1e-13)
+
+    def test_a_spline_of_too_many_points_or_one_that_falls_is_refused(self) -> None:
+        pad = {"elastic": {"law": "exponential", "m": 2.0, "b": 0.5}}
+        many = [0.1 * i for i in range(30)]
+        for depths, forces, said in ((many, many, "20 points at the most"), ([1.0, 2.0], [1.0, 0.5], "must not fall")):
+            entry = {"id": "elastic_law", "law": "spline", "delta_mm": depths, "force_N": forces}
+            with pytest.raises(ValueError, match=said):
+                Model.from_dict({"pad": pad, "effects": [entry]})
+
+    def test_units_may_be_written_with_a_dot(self) -> None:
+        pad = {"elastic": {"law": "exponential", "m": 2.0, "b": 0.5}}
+        for unit in ("N·s/mm", "N*s/mm"):
+            entry = {"id": "viscous_damping", "coefficient": {"value": 0.01, "unit": unit}}
+            assert Model.from_dict({"pad": pad, "effects": [entry]}).effects[0].active().values["coefficient"] == 0.01
 
     def test_a_law_and_another_form_contradict(self) -> None:
         entry = {"id": "elastic_law", "form": "power", "law": "exponential", "m": 1.0, "b": 1.0}
