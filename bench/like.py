@@ -44,6 +44,9 @@ FARTHEST = 6.0
 """Standard deviations that a surface may be moved; as many as in a fit (`identify.surface`). And times the greatest
 force, that the past may have left in a mode."""
 
+FAR = 3.0
+"""Standard deviations beyond which a surface is not where touch-off found it by chance."""
+
 CLOSE = 1e-4
 """Standard deviations to which the best place is found."""
 
@@ -98,6 +101,8 @@ class Likeness:
                 f"surface taken {1e3 * abs(self.moved_mm):.2g} µm {way} than touch-off said "
                 f"(its own doubt: {1e3 * self.measurement.surface_std_mm:.2g} µm)"
             )
+            if abs(self.moved_mm) > FAR * self.measurement.surface_std_mm:
+                said.append("so far off it stands for something else that the model gets wrong")
         return "; ".join(said)
 
 

@@ -61,7 +61,10 @@ def main(args: argparse.Namespace) -> int:
         said = " ".join(result.notes)  # most methods repeat what was heard on reading
         heard = [f"{m.name}: {note}" for m in measurements for note in m.notes if note not in said]
         print("\n".join([*heard, *fit_lines(result)]))
-        if lacking(result):
+        if lacking(result) and len(args.data) > 1:
+            runs = " ".join(shlex.quote(str(path)) for path in args.data)
+            print(f"whether these runs are of one pad: padbench compare {runs}")
+        elif lacking(result):
             data, model = (shlex.quote(str(path)) for path in (args.data[0], args.write or "MODEL"))
             print(f"what it may lack: padbench diagnose {data} --model {model}")
         if args.json:

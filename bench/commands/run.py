@@ -81,7 +81,10 @@ def main(args: argparse.Namespace) -> int:
                 left=left,
             )
     _say_outcome(outcome, bench, time.perf_counter() - started)
-    _after(outcome, preflight.prediction, believed)
+    if outcome.strikes > 1:  # whoever strikes twice wants the prompt
+        say(f"not fitted, since it was told to stop more than once: `padbench report {outcome.folder}` does that")
+    else:
+        _after(outcome, preflight.prediction, believed)
     return EXIT_DONE if outcome.cause is None else EXIT_NO
 
 

@@ -19,6 +19,7 @@ from sim.effects import all_effects
 from sim.model import Model
 from sim.pad import Pad
 
+from .as_given import as_given
 from .asked_again import asked_again, hum_asked_again, with_pulses
 from .candidates import CHANNEL
 from .channel import FEW, Faults, faults, not_of_the_motion
@@ -189,12 +190,13 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
     flagged = flags.flagged[prepared.kept]
     inside = m.counted()[prepared.kept]
     good = raw.weight[at] > 0
+    rmse_before = float(np.sqrt(np.mean((raw.force_N - before)[at][inside] ** 2)))
     return Diagnosis(
         verdict=verdict,
         causes=causes,
         left=float(left),
         noise_floor=floor_told(*held_out_N, left, floor) if causes else floor,
-        rmse_before=float(np.sqrt(np.mean((raw.force_N - before)[at][inside] ** 2))),
+        rmse_before=rmse_before,
         rmse_after=float(np.sqrt(np.mean(residual[at][good] ** 2))),
         held_out_before=held_out_N[0],
         held_out_after=held_out_N[1],
@@ -212,6 +214,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
             *([FEW_TO_TELL.format(counted)] if (counted := np.count_nonzero(full.weight)) < FEWEST else []),
         ],
         remainders=tests,
+        as_given=_as_given(prepared, search.believed, whole[0], rmse_before) if verdict == "consistent" else "",
         name=m.name,
         seen_once=any(most_sure(all_effects()[c.id], c.form, search.reach.rich) < 1.0 for c in causes),
         time_s=full.time_s[at],
@@ -225,6 +228,12 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         ranking=_ranking(path),
         rivals=[(t.id, model_of(believed, t.fit, prepared)) for t in (path.rivals[0][:RIVALS] if path.rivals else [])],
     )
+
+
+def _as_given(prepared: Prepared, believed: Structure, refitted: Fit, left_N: float) -> str:
+    raw, at = prepared.raw, prepared.at[prepared.raw.weight[prepared.at] > 0]
+    given_N = force_at(raw, believed, believed.x(believed.pad.x()))
+    return as_given(believed.pad.pad, refitted.pad, float(np.sqrt(np.mean((raw.force_N - given_N)[at] ** 2))), left_N)
 
 
 def _past(search: Search) -> list[str]:

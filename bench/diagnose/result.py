@@ -117,6 +117,8 @@ class Diagnosis:
     doubts: list[str] = field(default_factory=list)
     """What makes the data's units or sign doubtful, or is odd about their noise; in the file's notes too."""
     remainders: list[Remainder] = field(default_factory=list)
+    as_given: str = ""
+    """How far a consistent belief errs with the numbers it was given; empty where hardly more than refitted."""
     name: str = ""
     seen_once: bool = False
     """Whether the depth was passed so seldom that no name of a cause which acts with the motion is sure."""

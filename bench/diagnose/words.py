@@ -93,7 +93,7 @@ def verdict(d: Diagnosis) -> str:
             return f"{what} adds nothing to the noise"
         near = min(d.rmse_before, d.held_out_before) <= NEARLY * d.noise_floor
         return (
-            f"{what} explains these data "
+            f"{what}{', with its numbers refitted,' if d.as_given else ''} explains these data "
             f"{'down to their noise' if near else 'as far as they tell anything beyond their motion and noise'}"
         )
     if d.verdict == "explained":
@@ -150,6 +150,7 @@ def lowered(sentence: str) -> str:
 def lines(d: Diagnosis, how_next: str = HOW_NEXT) -> list[str]:
     """The diagnosis in some lines for a terminal; `how_next`: where the next test is, or how to come by it."""
     out = [headline(d)]
+    out += [f"  {d.as_given}"] if d.as_given else []
     for number, cause in enumerate(d.causes, 1):
         out += _cause(number, cause)
     if d.flagged_fraction > 0:

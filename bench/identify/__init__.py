@@ -58,10 +58,28 @@ def fit(
         options["sample_time"] = sample_time
     module = import_module(f".{METHODS[method]}", __package__)
     _check(module.fit, method, options)
+    runs, twice = _each_once(runs)
     result: FitResult = module.fit(
         runs, law=law, order=order, contact=contact, degree=degree, progress=progress, **options
     )
+    result.notes += twice
     return result
+
+
+def _each_once(runs: list[Measurement]) -> tuple[list[Measurement], list[str]]:
+    """Measurements without those that hold the samples of another one, and a note on each that was left out."""
+    import numpy as np
+
+    kept: list[Measurement] = []
+    notes = []
+    for m in runs:
+        same = (k for k in kept if np.array_equal(k.force_time_s, m.force_time_s))
+        first = next((k for k in same if np.array_equal(k.force_N, m.force_N)), None)
+        if first is None:
+            kept.append(m)
+        else:
+            notes.append(f"{m.name} holds the samples of {first.name} once more, and was left out.")
+    return kept, notes
 
 
 def _check(function: Callable[..., FitResult], method: str, options: dict[str, Any]) -> None:

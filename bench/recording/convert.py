@@ -60,6 +60,11 @@ def recording_to_csv(recording: Recording, target: Path) -> list[str]:
     if surface is None:
         notes.append("no touch-off in it: position_mm is in the motor frame")
         surface = 0.0
+    elif recording.surface_std_mm > 0.0:
+        notes.append(
+            f"a CSV has no place for the doubt of the surface (± {1e3 * recording.surface_std_mm:.2g} µm): a fit to it"
+            " takes 0 mm for certain, and states too small errors of the law; fit the recording itself"
+        )
     delays = delays_of(recording)
     if delays != Delays():
         notes.append("stamps are corrected by the bench's timing")

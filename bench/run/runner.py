@@ -68,6 +68,8 @@ class Outcome:
     held_up_s: float
     """By how much moves took longer than planned, because the motor answered too slowly."""
     motor_period_s: float
+    strikes: int = 0
+    """How often the operator, or the system, has asked it to stop."""
 
     @property
     def recording(self) -> Path:
@@ -182,7 +184,8 @@ def _run(
     if failure is not None:
         raise failure
     counts = loop.motor_count, loop.force_count
-    return Outcome(folder, cause or problem, run.found, seconds, *counts, loop.axis.held_up_s, loop.axis.period_s)
+    axis, strikes = loop.axis, loop.operator.strikes
+    return Outcome(folder, cause or problem, run.found, seconds, *counts, axis.held_up_s, axis.period_s, strikes)
 
 
 @contextmanager

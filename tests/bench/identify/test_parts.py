@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bench.identify import objective, problem
+from bench.identify import fit, objective, problem
 from bench.identify.condense import condensed
 from bench.identify.held_out import FOLDS, folds_of
 from bench.identify.laws import exponential
@@ -159,3 +161,14 @@ def test_a_search_ends_where_sums_of_sensitivities_overflow() -> None:
 
     s = minimise(normal, lambda x: float(x @ x), np.array([4.0]), np.array([-9.0]), np.array([9.0]))
     assert not s.converged and s.x[0] < 1 and s.cost == pytest.approx(s.x[0] ** 2) and s.matrix[0, 0] == 0
+
+
+def test_a_run_that_is_given_twice_counts_once() -> None:
+    first, other = stairs(100, force_N=0.02, seed=1), stairs(100, force_N=0.02, seed=2)
+    copy = replace(first, name="copy")
+    told = {"law": "exponential", "order": 2, "contact": "unilateral"}
+    once, twice = fit([first, other], **told), fit([first, copy, other], **told)
+    assert twice.parameters == once.parameters and twice.samples == once.samples
+    assert [note for note in twice.notes if note not in once.notes] == [
+        "copy holds the samples of data once more, and was left out."
+    ]

@@ -74,6 +74,7 @@ def test_a_run_as_csv(tmp_path):
     write_run(folder / "recording.mcap")
     notes = convert(folder, tmp_path / "run.csv")
     assert any("timing" in note for note in notes)
+    assert any("no place for the doubt of the surface" in note for note in notes)
     recording = read_recording(tmp_path / "run.csv")
     i = np.arange(3000)
     np.testing.assert_allclose(recording.motor.time_s, 1e-3 * i - 2e-4 - 5e-4, atol=1e-9)

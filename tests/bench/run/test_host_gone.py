@@ -289,3 +289,4 @@ def test_three_signals_do_not_tear_the_recording(tmp_path):
     assert recording.result["cause"] == "stopped by signal SIGTERM"
     (stop,) = [event for event in recording.events if event.name == "stop"]
     assert stop.data["manner"] == "hard"
+    assert "not fitted" in said and not (tmp_path / "out" / "model.yaml").exists()

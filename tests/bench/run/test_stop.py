@@ -212,6 +212,7 @@ def test_the_operator_stops_it(tmp_path, base, number, words):
     before = signal.getsignal(number)
     done = run(tmp_path, DEEP, base, hook=once(in_ramp, strike))
     stopped_well(done, words)
+    assert done.outcome.strikes == 2
     assert 0 <= done.events("stopped")[0].time_s - at[0] < 0.05
     assert signal.getsignal(number) is before
     stands = done.events("safe_state")[0].time_s

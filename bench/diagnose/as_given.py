@@ -1,0 +1,32 @@
+"""How far the numbers of a belief had to move: with those it was given it may err, although its structure does not."""
+
+from __future__ import annotations
+
+from sim.effects.reading import force
+from sim.elastic import NoPad
+from sim.pad import Pad
+
+NOTABLE = 1.5  # times the error that is left refitted
+CHANGED = 0.02  # of a number
+SHOWN = 4
+
+
+def as_given(believed: Pad, refitted: Pad, given_N: float, left_N: float) -> str:
+    """A sentence on it; empty where the numbers were as good as right. `given_N`, `left_N`: RMS errors with the numbers
+    as given and refitted."""
+    if isinstance(believed.law, NoPad) or given_N < NOTABLE * left_N:
+        return ""
+    before, after = _numbers(believed), _numbers(refitted)
+    moved = [(abs(after[n] - v) / max(abs(v), 1e-12), n) for n, v in before.items() if n in after]
+    most = sorted((m for m in moved if m[0] > CHANGED), reverse=True)[:SHOWN]
+    if not most:
+        return ""
+    names = [name for name in before if name in {n for _, n in most}]
+    changes = ", ".join(f"{name} {before[name]:.4g} → {after[name]:.4g}" for name in names)
+    return f"with its numbers as given it errs by {force(given_N)}; refitted: {changes}"
+
+
+def _numbers(pad: Pad) -> dict[str, float]:
+    shares, rates = pad.relaxation.shares, pad.relaxation.rates
+    modes = {f"c_{i}": c for i, c in enumerate(shares, start=1)} | {f"nu_{i}": v for i, v in enumerate(rates, start=1)}
+    return {**pad.law.parameters, **modes}
