@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import stdtrit
@@ -26,8 +26,8 @@ class Spread:
 
 
 def spread_of(problem: Problem, estimate: Estimate) -> Spread:
-    """Sandwich H⁻¹ S H⁻¹ (`sandwich`). The prior of a run's doubts adds its own spread, and so do stamps of the
-    position that may all be off together and were taken as they are. Variables at a bound have none.
+    """Sandwich H⁻¹ S H⁻¹ (`sandwich`). The prior of a run's doubts adds its own spread, and so do a surface, and stamps
+    of the position that may all be off together, which were taken as they are. Variables at a bound have none.
     """
     P = estimate.structure.size
     sensitivity, errors = _per_sample(problem, estimate)
@@ -38,8 +38,8 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
     believed = np.diag(objective.prior_of(problem, estimate.structure)) * problem.noise_square
     spread = sandwich(errors, sensitivity, inverse, believed, int(free.sum()))
     covariance = spread.covariance.copy()
-    for late in _late(problem, estimate):
-        moved = inverse @ late
+    for off in [*_late(problem, estimate), *_elsewhere(problem, estimate)]:
+        moved = inverse @ off
         covariance += np.outer(moved, moved)
     return Spread(covariance, spread.samples)
 
@@ -152,6 +152,22 @@ def _late(problem: Problem, estimate: Estimate) -> list[Array]:
         force = np.concatenate([piece.force for piece in pieces])
         weighted = run.weight * run.stamp_std_s * np.gradient(force, run.time_s)
         out.append(np.asarray(np.sum([p.jacobian.T @ weighted[p.at] for p in pieces], axis=0), dtype=np.float64))
+    return out
+
+
+def _elsewhere(problem: Problem, estimate: Estimate) -> list[Array]:
+    """Of each run whose doubtful surface was taken for certain: Σ w J δF, (P,), δF what one of its deviations makes."""
+    out = []
+    for run, m in zip(problem.runs, problem.measurements, strict=True):
+        if m.surface_std_mm <= 0 or run.surface is not None:
+            continue
+        moved = replace(run, u=run.u + m.surface_std_mm / problem.depth_mm)
+        here, there = (
+            list(objective.simulate(r, estimate.structure, estimate.x, derivatives=True)) for r in (run, moved)
+        )
+        change = np.concatenate([p.force for p in there]) - np.concatenate([p.force for p in here])
+        weighted = run.weight * change
+        out.append(np.asarray(np.sum([p.jacobian.T @ weighted[p.at] for p in here], axis=0), dtype=np.float64))
     return out
 
 

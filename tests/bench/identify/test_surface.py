@@ -72,3 +72,12 @@ def test_each_run_has_its_own_surface() -> None:
     several, offs = zip(*(misplaced(POWER, seed) for seed in (1, 2, 3)), strict=True)
     result = fit(list(several), law="power", order=1)
     assert np.allclose(result.surface_moved_mm, offs, atol=0.3 * DOUBT_MM)
+
+
+def test_a_method_that_takes_the_surface_for_certain_has_its_doubt_in_its_errors() -> None:
+    z = []
+    for seed in range(16):
+        result = fit(misplaced(EXPONENTIAL, seed)[0], method="recursive", law="exponential", order=2)
+        truth = EXPONENTIAL.parameters()
+        z += [(result.parameters[name].value - value) / result.parameters[name].std for name, value in truth.items()]
+    assert np.mean(np.abs(z) < 2) > 0.85 and np.std(z) > 0.5
