@@ -11,6 +11,7 @@ import numpy as np
 
 from bench.errors import InputError
 from bench.recording.types import Measurement
+from sim.model import Model
 from sim.transfer import NotARelaxation, relaxation_of
 
 from .. import asked
@@ -94,6 +95,7 @@ def _result(estimator: Estimator, data: Data, best: Candidate, candidates: list[
     V = found.V * unit
     noise = noise_of(data.on_grid())
     reading = _Reading(estimator, data, structure, found)
+    reading.doubt_the_grid(estimator, data, structure, found)
     about = findings(data.checked, noise_of(data.checked.measurements), structure.unilateral, pasts=False)
     lost = about.lost(reading.parameters) | set(reading.undetermined)
     notes = [*about.notes, *data.notes, f"Sampled every {data.T:.6g} s.", *reading.notes, *found.notes]
@@ -108,7 +110,7 @@ def _result(estimator: Estimator, data: Data, best: Candidate, candidates: list[
         order=structure.order,
         contact="unilateral" if structure.unilateral else "bonded",
         parameters=reading.parameters,
-        model_dict=reading.model,
+        model_dict=reading.stated,
         filter={
             "sample_time_s": data.T,
             "a": list(filter.a),
@@ -186,17 +188,52 @@ class _Reading:
             name: Parameter(value, unit, float(std[i]) if known or i < len(law) else float("nan"))
             for i, (name, value, unit) in enumerate(entries)
         }
-        self.undetermined = [name for name, p in self.parameters.items() if not _told(name, p, data.depth_mm)]
+        self.depth_mm = data.depth_mm
         self.model: dict[str, Any] = {
             "pad": {
                 "elastic": structure.family.entry(law),
                 "relaxation": {"shares": list(shares), "rates": list(rates)},
                 "contact": "unilateral" if structure.unilateral else "bonded",
-                "std": {
-                    n: p.std for n, p in self.parameters.items() if np.isfinite(p.std) and n[:2] not in ("a_", "b_")
-                },
             }
         }
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Names of the numbers that the data do not tell."""
+        return [name for name, p in self.parameters.items() if not _told(name, p, self.depth_mm)]
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """The model file's content, with the errors of its numbers."""
+        told = {n: p.std for n, p in self.parameters.items() if np.isfinite(p.std) and n[:2] not in ("a_", "b_")}
+        return {"pad": {**self.model["pad"], "std": told}}
+
+    def doubt_the_grid(self, estimator: Estimator, data: Data, structure: Structure, found: Found) -> None:
+        """Into the errors what the grid does to the numbers: the scheme is asked again with the force of this very
+        model, without noise, along the motion as it was measured, and what it then finds other is no noise's work."""
+        if not self.physical:
+            return
+        model = Model.from_dict(self.model)
+        clean = [
+            replace(m, force_N=model.simulate_at(m.position_time_s, m.position_mm, m.force_time_s))
+            for m in data.checked.measurements
+        ]
+        try:
+            again = sampled(clean, data.T)
+            other = _Reading(estimator, again, structure, estimator.estimate(again, structure, start=found.v))
+        except InputError:
+            return
+        off = {n: q.value - self.parameters[n].value for n, q in other.parameters.items() if n in self.parameters}
+        moved = [n for n, by in off.items() if abs(by) > self.parameters[n].std and self.parameters[n].value]
+        for name, by in off.items():
+            p = self.parameters[name]
+            self.parameters[name] = replace(p, std=float(np.hypot(p.std, by)))
+        if moved:
+            said = ", ".join(f"{n} by {100 * off[n] / self.parameters[n].value:+.2g} %" for n in moved)
+            self.notes.append(
+                f"The grid shifts its numbers, on data of this very model {said}: that is in their errors"
+                " (`--method continuous` has no grid)."
+            )
 
 
 def _told(name: str, p: Parameter, depth_mm: float) -> bool:
