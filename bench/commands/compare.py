@@ -31,13 +31,17 @@ def main(args: argparse.Namespace) -> int:
     from bench import identify
     from bench.fitview import fit_view
     from bench.report import write_comparison
+    from bench.report.agreement import lines
+    from bench.report.facts import sample_name
     from bench.results import fit_lines
 
     if len(args.runs) < 2:
         raise InputError("RUN", "one run alone compares with nothing", "name two or more")
-    measurements = pads(read_data(args, *args.runs))
+    recordings = read_data(args, *args.runs)
+    measurements, samples = pads(recordings), [sample_name(recording) for recording in recordings]
     views = []
-    for path, measurement in zip(args.runs, measurements, strict=True):
+    for path, measurement, sample in zip(args.runs, measurements, samples, strict=True):
+        name = f"{path} ({sample})" if sample else str(path)
         with status(f"fitting {path}") as progress:
             fit = identify.fit(
                 measurement,
@@ -48,8 +52,9 @@ def main(args: argparse.Namespace) -> int:
                 degree=args.degree,
                 progress=progress,
             )
-        print("\n".join([str(path), *(f"  {line}" for line in fit_lines(fit))]))
-        views.append((str(path), fit_view(fit)))
-    write_comparison(args.out, views)
+        print("\n".join([name, *(f"  {line}" for line in fit_lines(fit))]))
+        views.append((name, fit_view(fit)))
+    print("\n".join(lines([view.json for _, view in views], samples)))
+    write_comparison(args.out, views, samples=samples)
     print(f"page: {args.out}")
     return EXIT_DONE

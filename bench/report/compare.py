@@ -6,42 +6,38 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
-from scipy.special import chdtrc
 
 from bench.report import axes as parts
 from bench.report import curves, markup, numbers, verdict
-from bench.report.markup import digits, figure, forces, measured, section
+from bench.report.agreement import Entry, agreement, by_sample, differ, parameters_of
+from bench.report.markup import figure, forces, measured, section
 from bench.report.style import light
 from bench.report.svg import render
 from bench.report.view import Curve, FitView
 
 Runs = Sequence[tuple[str, FitView]]
 
-ALIKE = 0.01
-"""Parameters differ where equal ones would scatter so far in less than this share of cases …"""
-DOUBTFUL = 0.05
-"""… and are in doubt below this share, which is that of the intervals drawn: 95 % bars may then miss one another."""
 
-
-def write_comparison(path: Path, runs: Runs, *, title: str = "Comparison of runs") -> None:
-    """Write a page that compares fits; `runs` holds (name, fit), in the order to show.
+def write_comparison(path: Path, runs: Runs, *, samples: Sequence[str] = (), title: str = "Comparison of runs") -> None:
+    """Write a page that compares fits; `runs` holds (name, fit), in the order to show; `samples`: of each run, the
+    name of what was measured, or nothing.
 
     Raises ValueError when there is no run, OSError where the file cannot be written.
     """
     if not runs:
         raise ValueError("there is no run to compare")
-    path.write_text(comparison_page(runs, title), encoding="utf-8")
+    path.write_text(comparison_page(runs, title, samples), encoding="utf-8")
 
 
-def comparison_page(runs: Runs, title: str = "Comparison of runs") -> str:
+def comparison_page(runs: Runs, title: str = "Comparison of runs", samples: Sequence[str] = ()) -> str:
     """The comparison as HTML text."""
     names = _names(runs)
     body = f'<h1>{markup.text(title)}</h1>\n<p class="sub">{markup.text(" · ".join(_short_list(names)))}</p>\n'
     body += section("Verdicts", _verdicts(runs))
     body += section("Curves", _curves(runs))
-    body += section("Parameters", _table(runs) + _intervals(runs))
+    entries = parameters_of([fit.json for _, fit in runs])
+    body += section("Parameters", _table(runs, entries) + _by_sample(entries, samples) + _intervals(runs, entries))
     return markup.page(title, body + "<footer>Written by padbench. Intervals are 95 %.</footer>")
 
 
@@ -78,65 +74,49 @@ def _curves(runs: Runs) -> str:
     return f'<div class="pair">{pair}</div>\n' if pair else ""
 
 
-def _parameters(runs: Runs) -> dict[str, list[tuple[int, float, float, str, bool]]]:
-    """By parameter: (run, value, std, unit, undetermined) of each run that has it, runs counted from 0."""
-    found: dict[str, list[tuple[int, float, float, str, bool]]] = {}
-    for i, (_, fit) in enumerate(runs):
-        given = fit.json.get("parameters")
-        loose = {str(name) for name in fit.json.get("undetermined") or ()}
-        for name, entry in given.items() if isinstance(given, Mapping) else ():
-            value, std, unit = numbers.of(entry)
-            if math.isfinite(value):
-                found.setdefault(str(name), []).append((i, value, std, unit, str(name) in loose))
-    return found
-
-
-def _table(runs: Runs) -> str:
+def _table(runs: Runs, parameters: Mapping[str, list[Entry]]) -> str:
     rows = []
-    for name, entries in _parameters(runs).items():
+    for name, entries in parameters.items():
         cells = ["–"] * len(runs)
         for i, value, std, _, loose in entries:
             shown, doubt = measured(value, std)
             cells[i] = shown + (f" ± {doubt}" if doubt not in ("–", "0") else "") + (" (undetermined)" if loose else "")
-        rows.append([numbers.symbol(name), entries[0][3], *cells, agreement(entries)])
-    head = ["parameter", "unit", *_names(runs), "do they agree?"]
-    return markup.table(head, rows, numeric=tuple(range(2, 2 + len(runs))))
+        rows.append([numbers.symbol(name), entries[0].unit, agreement(entries), *cells])
+    head = ["parameter", "unit", "do they agree?", *_names(runs)]
+    return markup.table(head, rows, numeric=tuple(range(3, 3 + len(runs))))
+
+
+def _by_sample(parameters: Mapping[str, list[Entry]], samples: Sequence[str]) -> str:
+    """Means of the samples, where some were measured more than once, and whether they differ by more than repeats."""
+    names = list(dict.fromkeys(name for name in samples if name))
+    rows = []
+    for parameter, entries in parameters.items():
+        means, chance = by_sample(entries, samples) if samples else ([], math.nan)
+        if means:
+            told = {m.sample: f"{' ± '.join(measured(m.mean, m.std))} ({m.runs})" for m in means}
+            cells = [told.get(name, "–") for name in names]
+            rows.append([numbers.symbol(parameter), entries[0].unit, differ(chance), *cells])
+    if not rows:
+        return ""
+    caption = "By sample: means (of so many runs) with standard errors as repeats scatter, which no fit alone tells."
+    head = ["parameter", "unit", "do the samples differ?", *names]
+    table = markup.table(head, rows, numeric=tuple(range(3, 3 + len(names))))
+    return f"<p>{markup.text(caption)}</p>{table}"
 
 
 def _names(runs: Runs) -> list[str]:
     return [name for name, _ in runs]
 
 
-def agreement(entries: Sequence[tuple[int, float, float, str, bool]]) -> str:
-    """Whether values with these standard deviations may be one and the same: χ² of their weighted scatter.
-
-    Entries are (run, value, std, unit, undetermined); undetermined ones and those of unknown doubt do not vote.
-    """
-    voting = [(value, std) for _, value, std, _, loose in entries if math.isfinite(std) and std > 0 and not loose]
-    if len(voting) < 2:
-        return ""
-    value, std = np.array(voting).T
-    weight = 1.0 / std**2
-    mean = float(weight @ value / weight.sum())
-    chi2 = float(weight @ (value - mean) ** 2)
-    chance = float(chdtrc(len(voting) - 1, chi2))
-    if chance >= DOUBTFUL:
-        return "yes, within their uncertainty"
-    if chance >= ALIKE:
-        return f"perhaps: equal ones scatter so far in {digits(100 * chance, 2)} % of cases"
-    spread = f", spread {digits(100 * float(np.ptp(value)) / abs(mean), 2)} %" if mean else ""
-    return f"no{spread}, χ² {digits(chi2, 3)} of {len(voting) - 1}"
-
-
-def _intervals(runs: Runs) -> str:
+def _intervals(runs: Runs, parameters: Mapping[str, list[Entry]]) -> str:
     plots = ""
-    for k, (name, entries) in enumerate(_parameters(runs).items()):
+    for k, (name, entries) in enumerate(parameters.items()):
         if len(entries) >= 2:
             plots += f"<figure>{_interval_plot(f'interval{k}', name, entries, runs)}</figure>"
     return f'<div class="pair">{plots}</div>\n' if plots else ""
 
 
-def _interval_plot(key: str, name: str, entries: list[tuple[int, float, float, str, bool]], runs: Runs) -> str:
+def _interval_plot(key: str, name: str, entries: list[Entry], runs: Runs) -> str:
     height = 24.0 * len(entries) + 14.0
 
     def draw(figure_: Figure) -> None:
@@ -153,7 +133,7 @@ def _interval_plot(key: str, name: str, entries: list[tuple[int, float, float, s
         ax.set_ylim(len(entries) - 0.5, -0.5)
         ax.margins(x=0.08)
         ax.locator_params(axis="x", nbins=5)
-        unit = entries[0][3]
+        unit = entries[0].unit
         ax.set_xlabel(f"{numbers.symbol(name)}, {unit}" if unit not in ("", "1") else numbers.symbol(name))
 
     label = f"Parameter {name} of each run with its 95 % interval"

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from bench.report import FitView, PlanView, write_comparison, write_plan
-from bench.report.compare import agreement, comparison_page
+from bench.report.agreement import Entry, agreement, by_sample, differ, lines
+from bench.report.compare import comparison_page
 from bench.report.planned import plan_page
 
 from . import samples
@@ -34,13 +35,13 @@ def test_comparison_shows_every_run_and_where_they_differ(fit: FitView, tmp_path
     assert len(page.encode()) < 2_000_000
     words = check(page).shown
     assert "first <day>" in words and "second $day$" in words
-    assert "m N/mm 2.241 ± 0.010 2.343 ± 0.010 no, spread 4.4 %" in words
-    assert "b 1/mm 0.6893 ± 0.0021 0.6904 ± 0.0021 yes, within their uncertainty" in words
+    assert "m N/mm no, spread 4.4 %" in words and "2.241 ± 0.010 2.343 ± 0.010" in words
+    assert "b 1/mm yes, within their uncertainty 0.6893 ± 0.0021 0.6904 ± 0.0021" in words
 
 
 def test_agreement_is_the_chi_square_test() -> None:
-    def entries(*values: float) -> list[tuple[int, float, float, str, bool]]:
-        return [(i, value, 1.0, "N", False) for i, value in enumerate(values)]
+    def entries(*values: float) -> list[Entry]:
+        return [Entry(i, value, 1.0, "N", False) for i, value in enumerate(values)]
 
     # two values with std 1: χ² = d²/2 on one degree of freedom; its 5 % point is 3.841, so d = 2.772
     assert agreement(entries(0.0, 2.75)).startswith("yes")
@@ -50,9 +51,43 @@ def test_agreement_is_the_chi_square_test() -> None:
     assert agreement(entries(0.0, 3.68)).startswith("no")
     assert agreement(entries(0.0)) == ""
     # a surer value's own bar is hidden by its mark: 2.2 deviations of the other apart, beyond its 95 % bar
-    assert agreement([(0, 0.149951, 0.000091, "1", False), (1, 0.1686, 0.0085, "1", False)]).startswith("perhaps")
-    undetermined = [(0, 0.0, 1.0, "N", False), (1, 50.0, 1.0, "N", True)]
+    other = Entry(1, 0.1686, 0.0085, "1", False)
+    assert agreement([Entry(0, 0.149951, 0.000091, "1", False), other]).startswith("perhaps")
+    undetermined = [Entry(0, 0.0, 1.0, "N", False), Entry(1, 50.0, 1.0, "N", True)]
     assert agreement(undetermined) == ""
+
+
+def test_samples_are_held_against_the_scatter_of_their_repeats() -> None:
+    """Two samples of two runs, a unit apart each: F = 2 d² on 1 and 2 degrees, whose 5 % point is 18.513 (d = 3.042)
+    and whose 1 % point is 98.50 (d = 7.018)."""
+
+    def told(d: float, std: float = 1e-6) -> tuple[list[tuple[str, int, float, float]], str]:
+        values = [0.0, 1.0, d, d + 1.0]
+        means, chance = by_sample([Entry(i, v, std, "N", False) for i, v in enumerate(values)], ["a", "a", "b", "b"])
+        return [tuple(m) for m in means], differ(chance)  # type: ignore[misc]
+
+    assert told(3.0)[1] == "no further apart than repeats"
+    assert told(3.1)[1].startswith("perhaps apart: repeats scatter so far in 4.")
+    assert told(7.1)[1] == "further apart than repeats"
+    assert told(7.1)[0] == [("a", 2, 0.5, pytest.approx(0.5)), ("b", 2, pytest.approx(7.6), pytest.approx(0.5))]
+    # repeats that happen to lie close tell no more than the fits' own errors allow
+    assert told(7.1, std=10.0)[1] == "no further apart than repeats"
+
+
+def test_samples_without_repeats_or_names_are_not() -> None:
+    entries = [Entry(i, float(i), 0.1, "N", False) for i in range(3)]
+    for names in (["a", "b", "c"], ["a", "a", "a"], ["", "", ""], ["a", "a", ""]):
+        assert by_sample(entries, names)[0] == []
+
+
+def test_a_comparison_by_sample_in_page_and_terminal(fit: FitView) -> None:
+    # two fits of each pad 0.002 apart, with errors of 0.0102; the pads 0.5 apart
+    runs = [(f"run {i}", changed(fit, m=m)) for i, m in enumerate((2.240, 2.242, 2.740, 2.742))]
+    words = check(comparison_page(runs, samples=["soft", "soft", "hard", "hard"])).shown
+    assert "further apart than repeats" in words and "2.2410 ± 0.0072 (2)" in words
+    said = lines([view.json for _, view in runs], ["soft", "soft", "hard", "hard"])
+    assert any("soft 2.2410 ± 0.0072 (2), hard 2.7410 ± 0.0072 (2): further apart" in line for line in said)
+    assert "By sample" not in check(comparison_page(runs)).shown
 
 
 def test_different_laws_and_missing_doubt_compare(fit: FitView) -> None:
