@@ -210,7 +210,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
             *_past(search),
             *(hidden(swing.frequency_Hz, prepared.sample_s) if swing is not None else []),
             *(stays_bonded(search, path) if causes else []),
-            *([ENDED_EARLY] if path.cut_short else []),
+            *([ENDED_EARLY] if path.cut_short and verdict != "consistent" else []),
             *([FEW_TO_TELL.format(counted)] if (counted := np.count_nonzero(full.weight)) < FEWEST else []),
         ],
         remainders=tests,

@@ -21,7 +21,7 @@ from bench.recording.between import Spans, between_polls
 from bench.recording.schemas import BENCH_FILE, NO_SURFACE, STOPPED
 from bench.recording.stairs import stairs
 from bench.recording.types import Array, Event, Measurement, Recording
-from drivers.motor import STREAMED
+from drivers.motor import STREAMED, RAREST_Hz
 
 GAP = 5.0
 """A pause between samples of more than so many usual periods is reported."""
@@ -137,9 +137,11 @@ def _stairs(
     spans = stairs(time_s, told_mm, *force)
     if spans:
         lasts_s, rate_Hz = sum(end - begin for begin, end in spans), 1.0 / float(np.median(np.diff(time_s)))
+        late = "late now and then, by a late computer"
+        often = f"only {rate_Hz:.3g} times a second" if rate_Hz < RAREST_Hz else late
         notes.append(
-            f"force: {lasts_s:.2g} s of fast motion cost nothing in a fit: the motor was told a position only "
-            f"{rate_Hz:.3g} times a second, and what the pad felt between two of them no sample shows"
+            f"force: {lasts_s:.2g} s of fast motion cost nothing in a fit: the motor was told a position {often}, "
+            "and what the pad felt between two of them no sample shows"
         )
     return spans
 
