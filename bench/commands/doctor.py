@@ -49,9 +49,12 @@ def main(args: argparse.Namespace) -> int:
     from bench.daily.open_bench import OpenBench
 
     with OpenBench(bench) as work:
-        wishes = doctor.Wishes(
-            args.seconds, args.force_cap, args.press, lambda question: agreed(question, yes=args.yes, must_say=True)
-        )
+        simulated = bench.all_simulated
+
+        def right(question: str) -> bool:
+            return agreed(question, yes=args.yes, must_say=True, nobody=simulated)
+
+        wishes = doctor.Wishes(args.seconds, args.force_cap, args.press, right)
         checkup, failure = Checkup(), None
         try:
             doctor.examine(work, wishes, checkup)

@@ -89,18 +89,25 @@ def asked(question: str, otherwise: str = "") -> str:
     return line.strip()
 
 
-def agreed(question: str, *, yes: bool, must_say: bool = False) -> bool:
+def agreed(question: str, *, yes: bool, must_say: bool = False, nobody: bool = False) -> bool:
     """Whether the person says yes; `yes`: it was said on the command line.
 
-    Enter is no, but where a no would be believed (`must_say`); what is neither is asked again.
+    Enter is no, but where a no would be believed (`must_say`); what is neither is asked again. `nobody`: where there is
+    nobody to be asked at all it is yes, as on a simulated bench, which harms nobody.
     """
     if yes:
         return True
     known = {"y": True, "yes": True, "n": False, "no": False, **({} if must_say else {"": False})}
     while True:
-        answer = asked(f"{question} [y/n]" if must_say else f"{question} [y/N]", ", or say --yes").lower()
+        try:
+            answer = asked(f"{question} [y/n]" if must_say else f"{question} [y/N]", ", or say --yes").lower()
+        except Refused:
+            if nobody:
+                return True
+            raise
         if answer in known:
             return known[answer]
+        nobody = False  # there is somebody
 
 
 def positive(name: str, value: float, most: float, unit: str, cure: str) -> float:

@@ -245,6 +245,12 @@ def test_an_answer_that_is_none_is_not_taken_for_a_no(padbench, monkeypatch, ans
     assert said.status == 1 and "nobody answers" in said.err and "motor.direction" not in said.out
 
 
+def test_a_simulated_bench_is_examined_where_nobody_can_be_asked(padbench, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    said = padbench("doctor", "simulated", "--seconds", "1", "--json", "-")
+    assert said.status == 0 and json.loads(said.out)["well"] is True
+
+
 def test_what_was_found_before_a_failure_is_told_with_it(padbench, tmp_path):
     """There is no pad to press: rates, noise and the rest were measured all the same."""
     path = bench_file(tmp_path, simulation={"surface": 1000.0})
