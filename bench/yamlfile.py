@@ -236,6 +236,15 @@ def read_yaml(path: str | Path) -> Document:
     return parse(read_text(path), path)
 
 
+KINDS = {
+    "protocol": ("steps",),
+    "bench": ("motor", "load_cell"),
+    "series' list": ("samples",),
+    "model": ("pad",),
+}
+"""Files of ours, by the keys that tell them."""
+
+
 def validate(document: Document, cls: type[M]) -> M:
     """The document as an object of `cls`; raises one `InputError` that names the first fault and lists the others.
 
@@ -245,6 +254,11 @@ def validate(document: Document, cls: type[M]) -> M:
     if not isinstance(document.data, dict):
         what = "is empty" if document.data is None else "must be a mapping of `key: value` lines"
         raise document.error((), what, f"needed here: {', '.join(_required(cls)) or 'see padbench schema'}")
+    wanted, own = next(((k, keys) for k, keys in KINDS.items() if set(keys) <= set(cls.model_fields)), ("", ()))
+    if not any(key in document.data for key in own):
+        for kind, keys in KINDS.items():
+            if wanted and all(key in document.data for key in keys):
+                raise document.error((), f"is a {kind}", f"wanted here: a {wanted} (with {' and '.join(own)})")
     try:
         return cls.model_validate_json(json.dumps(document.data), strict=True)
     except ValidationError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from bench.commands.options import add_columns, add_structure, pads, read_data, status
+from bench.commands.options import add_columns, add_structure, named_by_file, pads, read_data, status
 from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE, InputError
 
@@ -42,7 +42,7 @@ def main(args: argparse.Namespace) -> int:
     views = []
     for path, measurement, sample in zip(args.runs, measurements, samples, strict=True):
         name = f"{path} ({sample})" if sample else str(path)
-        with status(f"fitting {path}") as progress:
+        with status(f"fitting {path}") as progress, named_by_file([path], [measurement]):
             fit = identify.fit(
                 measurement,
                 method=args.method,

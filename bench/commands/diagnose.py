@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.commands.options import add_columns, read_data, status
+from bench.commands.options import add_columns, named_by_file, read_data, status
 from bench.commands.outputs import add_json, add_output
 from bench.errors import EXIT_DONE, InputError
 
@@ -51,7 +51,7 @@ def main(args: argparse.Namespace) -> int:
         cure = "name a model with `elastic: {law: none}`: it tells of the bench alone"
         raise InputError(str(args.data), f"was recorded in air: {args.model} has nothing to press there", cure)
     measurement = recording.measurement()
-    with status("diagnosing", quiet=args.json == "-") as progress:
+    with status("diagnosing", quiet=args.json == "-") as progress, named_by_file([args.data], [measurement]):
         result = diagnose(measurement, model, progress)
         progress("designing the next test")
         result.next_protocol = next_test(result, recording, measurement)

@@ -7,7 +7,7 @@ import json
 import shlex
 from pathlib import Path
 
-from bench.commands.options import add_columns, add_structure, pads, read_data, status
+from bench.commands.options import add_columns, add_structure, named_by_file, pads, read_data, status
 from bench.commands.outputs import add_json, add_output
 from bench.errors import EXIT_DONE
 
@@ -42,7 +42,7 @@ def main(args: argparse.Namespace) -> int:
 
     measurements = pads(recordings)
     options = {name: getattr(args, name) for name in ("starts", "ramps") if getattr(args, name) is not None}
-    with status("fitting", quiet=args.json == "-") as progress:
+    with status("fitting", quiet=args.json == "-") as progress, named_by_file(args.data, measurements):
         result = identify.fit(
             measurements,
             method=args.method,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,7 +40,7 @@ def add_structure(parser: argparse.ArgumentParser) -> None:
         "iv (iterative, unbiased); recursive (as while the run goes on)",
     )
     parser.add_argument("--law", default="auto", help="exponential, power, polynomial, spline or auto (default)")
-    parser.add_argument("--order", default="auto", help="relaxation modes: 1 to 4 or more, or auto (default)")
+    parser.add_argument("--order", default="auto", help="relaxation modes: 1 to 8, or auto (default)")
     parser.add_argument("--degree", type=int, metavar="N", help="degree of a polynomial law")
     parser.add_argument(
         "--contact", default="auto", choices=["auto", "bonded", "unilateral"], help="default: %(default)s"
@@ -65,6 +65,17 @@ def pads(recordings: list[Recording]) -> list[Measurement]:
             cure = "fit a run with an approach; an air run tells of the bench alone"
             raise InputError(str(recording.source), "was recorded in air: there is no pad in it", cure)
     return [recording.measurement() for recording in recordings]
+
+
+@contextmanager
+def named_by_file(paths: Sequence[Path], measurements: Sequence[Measurement]) -> Iterator[None]:
+    """Have what is wrong with a measurement said of the file that it came from: two folders may hold one name."""
+    try:
+        yield
+    except InputError as error:
+        files = {m.name: str(path) for path, m in zip(paths, measurements, strict=True)}
+        place = ", ".join(files.get(name, name) for name in error.place.split(", "))
+        raise InputError(place, error.message, error.cure) from None
 
 
 def say_plan(preflight: Preflight) -> None:

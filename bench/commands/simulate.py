@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bench.commands.options import add_columns, read_data
+from bench.commands.options import add_columns, named_by_file, read_data
 from bench.commands.outputs import add_output
 from bench.errors import EXIT_DONE, InputError
 
@@ -88,7 +88,8 @@ def _over_data(args: argparse.Namespace, model: Model) -> int:
 
     measured = read_data(args, args.like)[0].measurement()
     t, x, force_t = measured.position_time_s, measured.position_mm, measured.force_time_s
-    like = likeness(model, measured)
+    with named_by_file([args.like], [measured]):
+        like = likeness(model, measured)
     force = like.force_N
     _must_be_finite(args.model, force)
     if force_t.size == t.size and not np.array_equal(force_t, t):

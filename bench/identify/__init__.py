@@ -54,7 +54,9 @@ def fit(
     runs = list(measurements) if isinstance(measurements, Sequence) else [measurements]
     if sample_time is not None:
         if not METHODS[method].startswith("discrete."):
-            raise InputError("--sample-time", f"the {method} method takes the data at their own times")
+            discrete = ", ".join(name for name, module in METHODS.items() if module.startswith("discrete."))
+            said = f"the {method} method takes the data at their own times"
+            raise InputError("--sample-time", said, f"It is for --method {discrete}.")
         options["sample_time"] = sample_time
     module = import_module(f".{METHODS[method]}", __package__)
     _check(module.fit, method, options)

@@ -13,6 +13,7 @@ import yaml
 from tests.bench.run.benches import SHORT, bench_file, merged, run
 from tests.bench.said import Said
 
+SHIPPED = Path(__file__).parents[2] / "protocols"
 MODEL: dict[str, Any] = {
     "pad": {
         "elastic": {"law": "exponential", "m": 2.24, "b": 0.69},
@@ -213,10 +214,23 @@ def test_a_recording_that_is_none(padbench, content, message):
         (("run", "quick", "--out", "/proc/x"), (r"/proc/x: cannot be written", "--out")),
         (("check", "missing.yaml"), (r"missing\.yaml: there is no such file",)),
         (("emulate", "nope"), (r"no shipped bench of that name",)),
+        (("check", "a_bench.yaml"), (r"a_bench\.yaml:\d+:1: is a bench", "wanted here: a protocol")),
+        (("check", "quick", "--bench", "a_protocol.yaml"), (r"is a protocol", "wanted here: a bench")),
+        (("check", "quick", "--pad", "a_bench.yaml"), (r"is a bench", "wanted here: a model")),
+        (("check", "a_model.yaml"), (r"a_model\.yaml:\d+:1: is a model", "wanted here: a protocol")),
+        (("fit", "short.csv"), (r"short\.csv: only 12 force samples can be fitted",)),
+        (("fit", "data.csv", "--sample-time", "0.01"), (r"--sample-time: the continuous method", "noniterative")),
     ],
 )  # fmt: skip
 def test_what_is_not_there_or_makes_no_sense(padbench, csv, words, patterns):
     Path("data.csv").write_bytes(csv.read_bytes())
+    Path("short.csv").write_bytes(b"\n".join(csv.read_bytes().split(b"\n")[:13]))
+    for kind, folder, name in (
+        ("bench", "benches/", "simulated"),
+        ("protocol", "", "quick"),
+        ("model", "pads/", "silicone"),
+    ):
+        Path(f"a_{kind}.yaml").write_bytes((SHIPPED / f"{folder}{name}.yaml").read_bytes())
     Path("full").mkdir()
     Path("full/notes.txt").write_text("mine")
     said = padbench(*words)
@@ -272,10 +286,10 @@ def test_a_run_that_never_met_the_pad_is_no_data_to_fit(padbench, tmp_path):
 
 
 SIZES = {
-    "force": ((1, 1, 1e300), r"scaled: holds a force of [\d.]+e\+300 N"),
-    "position": ((1, 1e200, 1), r"scaled: holds a position of 2e\+200 mm"),
-    "time": ((1e200, 1, 1), r"scaled: holds a time of 9\.98e\+200 s"),
-    "little force": ((1, 1, 1e-200), r"scaled: holds no force beyond [\d.]+e-200 N"),
+    "force": ((1, 1, 1e300), r"scaled\.csv: holds a force of [\d.]+e\+300 N"),
+    "position": ((1, 1e200, 1), r"scaled\.csv: holds a position of 2e\+200 mm"),
+    "time": ((1e200, 1, 1), r"scaled\.csv: holds a time of 9\.98e\+200 s"),
+    "little force": ((1, 1, 1e-200), r"scaled\.csv: holds no force beyond [\d.]+e-200 N"),
 }
 
 
