@@ -21,9 +21,12 @@ GRID_S = 1e-3
 """Steps in which the force is passed through the servo."""
 
 TIMES_S = np.geomspace(8e-3, 0.3, 15)
-LATER_S = (0.0, 3e-3, 6e-3)
+LATER_S = np.array([0.0, 3e-3, 6e-3])
 COMPLIANCES_MM_N = np.geomspace(2e-4, 5e-2, 45)
 """Time constants τ, delays λ and compliances 1/k that are weighed."""
+
+FINER = 3
+"""Times that they are weighed, each time on a finer grid about what is likely."""
 
 CLEARLY = 8.0
 """Giving way counts when it makes the polls likelier than a stiff axis does, by so much in their logarithm."""
@@ -71,22 +74,37 @@ def giving_way(
         off = missed_mm + way_mm
         return np.asarray(np.log(ndtr((off + half) / noise) - ndtr((off - half) / noise) + STRAY).sum(axis=-1))
 
-    shapes = [(_passed(force, tau_s), later_s) for tau_s in TIMES_S for later_s in LATER_S]
-    at_polls = np.array([np.interp(time_s - later_s, grid, passed) for passed, later_s in shapes])
-    told = np.array([likely(compliance * at_polls) for compliance in COMPLIANCES_MM_N])
-    if told.max() < likely(np.zeros(time_s.size)) + CLEARLY:
-        return None
-    weight = np.exp(told - told.max())
-    weight[weight < TOLD] = 0.0
-    weight /= weight.sum()
+    times_s, later_s, compliances = TIMES_S, LATER_S, COMPLIANCES_MM_N
+    for _ in range(FINER):
+        shapes = [(_passed(force, tau), later) for tau in times_s for later in later_s]
+        at_polls = np.array([np.interp(time_s - later, grid, passed) for passed, later in shapes])
+        told = np.array([likely(compliance * at_polls) for compliance in compliances])
+        if told.max() < likely(np.zeros(time_s.size)) + CLEARLY:
+            return None
+        weight = np.exp(told - told.max())
+        weight[weight < TOLD] = 0.0
+        weight /= weight.sum()
+        used = compliances
+        among = weight.reshape(len(compliances), len(times_s), len(later_s))
+        times_s, later_s, compliances = (
+            _finer(values, among.sum(axis=other).ravel())
+            for values, other in ((times_s, (0, 2)), (later_s, (0, 1)), (compliances, (1, 2)))
+        )
     mean, square = np.zeros(grid.size), np.zeros(grid.size)
     for j in np.flatnonzero(weight.any(axis=0)):
-        passed, later_s = shapes[j]
-        shape = np.interp(grid - later_s, grid, passed)
-        mean += float(weight[:, j] @ COMPLIANCES_MM_N) * shape
-        square += float(weight[:, j] @ COMPLIANCES_MM_N**2) * shape**2
-    compliance = float(weight.sum(axis=1) @ COMPLIANCES_MM_N)
+        passed, later = shapes[j]
+        shape = np.interp(grid - later, grid, passed)
+        mean += float(weight[:, j] @ used) * shape
+        square += float(weight[:, j] @ used**2) * shape**2
+    compliance = float(weight.sum(axis=1) @ used)
     return GivingWay(grid, mean, np.sqrt(np.maximum(square - mean**2, 0.0)), compliance)
+
+
+def _finer(values: Array, weight: Array) -> Array:
+    """As many values between the neighbours of those that have weight (n,)."""
+    likely = np.flatnonzero(weight > 0.0)
+    first, last = max(int(likely[0]) - 1, 0), min(int(likely[-1]) + 1, len(values) - 1)
+    return np.linspace(values[first], values[last], len(values))
 
 
 def _passed(force_N: Array, tau_s: float) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bench.recording import Event, ForceChannel, MotorChannel, Recording, StepMark
+from bench.recording.giving_way import giving_way
 
 SPEED, ACCELERATION = 60.0, 3000.0
 COUNT_MM = 0.01
@@ -173,3 +174,28 @@ def test_what_is_not_known_costs_nothing():
     assert not counted[quick.force_time_s < 0.2].any(), "before the first step it is history, as ever"
     slow = Axis([0.0, 0.5], stiffness=6.0, speed=0.6).recording(stamp_std_s=5e-4, noise_N=0.01).measurement()
     assert slow.counted()[slow.force_time_s > 0.2].mean() > 0.95
+
+
+def test_what_an_axis_gives_way_is_known_as_well_as_it_is_said_to_be():
+    """A servo's numbers between those of any grid, on polls of a coarse count; the pad's force steps and relaxes."""
+    compliance_mm_N, tau_s, later_s, h = 8.2e-3, 0.0335, 0.0042, 2.5e-4
+    t = np.arange(0.0, 40.0, h)
+    steps_N = np.diff([0.0, 2.0, 6.6, 5.0, 11.0, 3.0, 8.0, 1.0, 0.0])
+    since = t[:, None] - (2.0 + 4.5 * np.arange(len(steps_N)))
+    rises = np.clip(since / 0.03, 0.0, 1.0) * (0.7 + 0.3 * np.exp(-4.0 * np.maximum(since, 0.0)))
+    force = rises @ steps_N
+    behind = np.zeros(t.size)  # (1/k) τ x' + x = τ F', by the trapezoidal rule
+    for n in range(1, t.size):
+        behind[n] = ((2 * tau_s - h) * behind[n - 1] + 2 * tau_s * (force[n] - force[n - 1])) / (2 * tau_s + h)
+    true_mm = compliance_mm_N * np.interp(t - later_s, t, behind)
+    off = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        polls_s = np.arange(0.5, 39.5, 0.011) + rng.uniform(0.0, 0.001, 3546)
+        stands = -np.interp(polls_s, t, true_mm) + 7e-4 * rng.standard_normal(polls_s.size)
+        felt_s = np.arange(0.0, 40.0, 0.002)
+        felt_N = np.interp(felt_s, t, force) + 0.01 * rng.standard_normal(felt_s.size)
+        way = giving_way(polls_s, np.rint(stands / 0.01) * 0.01, felt_s, felt_N, 0.01, 7e-4)
+        assert way is not None and way.compliance_mm_N == pytest.approx(compliance_mm_N, rel=0.2)
+        off.append(np.mean((way.at(t) - true_mm) ** 2) / np.mean(way.std_at(t) ** 2))
+    assert 0.3 < np.sqrt(np.mean(off)) < 2.0
