@@ -27,7 +27,9 @@ def forms(structure: Structure, in_air: bool, reach: Reach, also_unsought: bool 
                 continue
             if form.has_a_course and not reach.rich:  # where depths are met once, any error is one of its time
                 continue
-            if not (form.sought or also_unsought) or (form.amend is not None and not _amends(structure, form)):
+            if form.given or not (form.sought or also_unsought):
+                continue
+            if form.amend is not None and not _amends(structure, form):
                 continue
             out.append((effect, narrowed(form, reach)))
     return out

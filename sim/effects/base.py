@@ -117,6 +117,11 @@ class Form:
             raise ValueError(f"form {self.name}: no place {', '.join(sorted(unknown))}")
 
     @property
+    def given(self) -> bool:
+        """Whether all its numbers are choices, of which a fit can change none."""
+        return bool(self.parameters) and all(p.fixed for p in self.parameters)
+
+    @property
     def has_a_course(self) -> bool:
         """Whether it is now more and now less in time, by half waves over the data."""
         return any(p.spread is not None for p in self.parameters)

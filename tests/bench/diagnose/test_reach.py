@@ -53,3 +53,10 @@ def test_what_was_pressed_before_as_deep_as_the_run_goes_does_not_soften_in_it()
     form = narrowed(effect("stress_softening").form("preconditioned"), reach)
     already = next(p for p in form.parameters if p.name == "already")
     assert already.upper < 1.5 and already.starts and max(already.starts) <= already.upper
+
+
+def test_a_form_of_which_a_fit_can_change_nothing_is_no_candidate() -> None:
+    reach = Reach(sample_s=0.01, span_s=60.0, travel_mm=3.0, depth_mm=2.5, force_N=5.0, changes_N=60.0)
+    structure = Structure(PadNumbers(Pad(Polynomial((0.0, 1.0)), Relaxation(), unilateral=True), 2.5, 5.0), ())
+    found = [form.name for _, form in forms(structure, False, reach, also_unsought=True)]
+    assert "fine_spline" in found and "points" not in found
