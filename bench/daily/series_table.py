@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from typing import Any
 
 from bench.daily.series_file import Series
 from bench.daily.series_state import State
 from bench.daily.yaml_edit import write_whole
+from bench.report.markup import measured
 from bench.run.folder import FIT
 
 TABLE = "series.csv"
@@ -55,13 +57,20 @@ def write(series: Series, found: list[dict[str, Any]]) -> None:
     write_whole(series.out / TABLE, text.getvalue())
 
 
+def _with_doubt(value: float | None, std: float | None) -> str:
+    if value is None:
+        return "–"
+    shown, doubt = measured(value, math.nan if std is None else std)
+    return shown if doubt in ("–", "0") else f"{shown} ± {doubt}"
+
+
 def lines(found: list[dict[str, Any]]) -> list[str]:
     """The table for a terminal: the pad, how it went, the first fitted parameters, the error."""
     names = [name.removesuffix("_std") for name in columns(found) if name.endswith("_std")][:_SHOWN]
     head = ["pad", "", *names, "error mN"]
     body = []
     for row in found:
-        numbers = [f"{row[name]:.4g}" if row.get(name) is not None else "–" for name in names]
+        numbers = [_with_doubt(row.get(name), row.get(f"{name}_std")) for name in names]
         error = f"{1e3 * row['rmse']:.3g}" if row.get("rmse") is not None else "–"
         body.append([row["id"], row["status"], *numbers, error])
     widths = [max(len(line[i]) for line in [head, *body]) for i in range(len(head))]

@@ -64,9 +64,9 @@ def name_of(id_: str) -> str:
     return NAMES.get(id_, id_.replace("_", " "))
 
 
-def named(d: Diagnosis) -> str:
-    """The causes' names as one phrase."""
-    names = [name_of(c.id) for c in d.causes]
+def named(d: Diagnosis, marked: bool = False) -> str:
+    """The causes' names as one phrase; `marked`: with a `perhaps` before those of which one is not sure."""
+    names = [f"{'perhaps ' if marked and is_unsure(c) else ''}{name_of(c.id)}" for c in d.causes]
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
@@ -123,7 +123,12 @@ def not_known(d: Diagnosis) -> str:
 
 def unsure(d: Diagnosis) -> bool:
     """Whether a name is as likely another."""
-    return any(max(c.confidence, c.of_its_kind) <= TOLD_ONCE for c in d.causes)
+    return any(is_unsure(c) for c in d.causes)
+
+
+def is_unsure(cause: CauseFound) -> bool:
+    """Whether its name is as likely another."""
+    return max(cause.confidence, cause.of_its_kind) <= TOLD_ONCE
 
 
 def errors(d: Diagnosis) -> str:
@@ -138,7 +143,9 @@ def errors(d: Diagnosis) -> str:
 def headline(d: Diagnosis) -> str:
     """The verdict in one line, its word first."""
     if d.verdict == "explained":
-        return f"explained{', perhaps' if unsure(d) else ''} by {named(d)}: {errors(d)}"
+        if all(is_unsure(c) for c in d.causes):
+            return f"explained, perhaps by {named(d)}: {errors(d)}"
+        return f"explained by {named(d, marked=True)}: {errors(d)}"
     return f"{d.verdict}: {lowered(verdict(d).removeprefix('Unexplained: '))}; {errors(d)}"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -41,9 +42,13 @@ def write_csv(
     cells += [_cells(stamps, times, values) for times, values in columns.values()]
     lines = [",".join(map(_quoted, [NAMES["time"], *columns]))]
     lines += map(",".join, zip(*cells, strict=True))
+    there = path.exists()
     try:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="")
     except OSError as error:
+        if not there:  # a part of a table looks like a whole one
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
         raise InputError(str(path), f"cannot be written ({error.strerror})", "name another place for it") from None
 
 

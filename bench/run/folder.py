@@ -42,7 +42,7 @@ def own_folder(protocol_name: str, out: Path | None, now: datetime.datetime) -> 
     """`out`, or `runs/<local date>_<time>_<protocol>[_n]/` in the working directory, this run's alone until the end.
 
     Who comes second to one folder is refused and leaves it as it is, however close behind. A run that is refused
-    inside leaves no folder where there was none.
+    inside, or stopped before there is anything in it, leaves no folder where there was none.
     Raises `InputError` where `out` is not empty or another run has it, or where it cannot be made.
     """
     folder, made = _made(protocol_name, out, now)
@@ -53,9 +53,9 @@ def own_folder(protocol_name: str, out: Path | None, now: datetime.datetime) -> 
         try:
             _try_writing(folder)
             yield folder
-        except (InputError, Refused):
+        except (InputError, Refused, KeyboardInterrupt):
             if made:
-                discard(folder)
+                discard(folder)  # which takes away an empty one only
             raise
 
 

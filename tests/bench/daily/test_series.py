@@ -302,7 +302,7 @@ def test_the_command_writes_table_and_csv(padbench, tmp_path, monkeypatch):
 
     monkeypatch.setattr("bench.results.analyse", analysed)
     said = padbench("series", path, "--yes")
-    assert said.status == 0 and re.search(r"^pad 2 +done +2\.2 +3\.6 +9\.8", said.out, re.M)
+    assert said.status == 0 and re.search(r"^pad 2 +done +2\.200 ± 0\.020 +3\.6\d* +9\.8", said.out, re.M)
     table = list(csv.DictReader(io.StringIO((tmp_path / "out" / "series.csv").read_text())))
     assert [row["id"] for row in table] == ["pad-1", "pad 2"] and table[0]["m"] == "2.2" and table[0]["m_std"] == "0.02"
     assert table[0]["thickness"] == "3.2" and table[1]["undetermined"] == "nu_1" and table[1]["nu_1_std"] == ""

@@ -125,3 +125,19 @@ def test_what_cannot_be_converted(tmp_path):
 def test_times_that_do_not_increase_are_refused(tmp_path):
     with pytest.raises(ValueError, match="increase"):
         write_csv(tmp_path / "a.csv", np.array([0.0, 0.0]), np.zeros(2), np.array([0.0, 1.0]), np.zeros(2))
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_disk_that_fills_leaves_no_part_of_a_table(tmp_path, monkeypatch, there):
+    path = tmp_path / "out.csv"
+    if there:
+        path.write_text("mine")
+
+    def fills(self, text, **_):
+        self.write_bytes(b"time_s,posi")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.write_text", fills)
+    with pytest.raises(InputError, match=r"out\.csv: cannot be written \(No space left"):
+        write_csv(path, np.arange(3.0), np.zeros(3), np.arange(3.0), np.zeros(3))
+    assert path.exists() == there

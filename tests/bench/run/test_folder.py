@@ -65,3 +65,13 @@ def test_a_refused_run_leaves_no_folder_but_one_that_was_there(tmp_path, there):
     with pytest.raises(InputError, match="no device"), own_folder("quick", out, NOW):
         raise InputError("port", "no device answers")
     assert out.exists() == there
+
+
+@pytest.mark.parametrize("begun", [False, True])
+def test_a_run_that_is_stopped_before_it_began_leaves_no_folder(tmp_path, begun):
+    out = tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt), own_folder("p", out, datetime.datetime(2026, 11, 1)) as folder:
+        if begun:
+            (folder / "recording.mcap").write_bytes(b"mine")
+        raise KeyboardInterrupt
+    assert out.exists() == begun
