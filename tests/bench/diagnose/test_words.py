@@ -39,7 +39,7 @@ def test_an_explanation_under_a_doubtful_name_is_one_that_can_be():
     doubted = made_up(causes=[replace(d.causes[0], confidence=0.5)])
     assert verdict(doubted) == "What the model gets wrong can be explained by friction"
     assert lines(doubted)[0].startswith("explained, perhaps by friction: ")
-    other = replace(made_up().causes[0], id="stress_softening", confidence=0.95)
+    other = replace(d.causes[0], id="stress_softening", form="linear", parameters={}, confidence=0.95)
     said = lines(made_up(causes=[doubted.causes[0], other]))[0]
     assert said.startswith("explained by perhaps friction and stress softening: ")
     late = made_up(causes=[replace(d.causes[0], confidence=0.4, of_its_kind=0.98)])
