@@ -53,6 +53,7 @@ def fit_view(fit: FitResult, over: OverTimes | None = None) -> FitView:
         notes=fit.notes,
         history=fit.history,
         over_times=over,
+        c_0_std=rest.std if (rest := fit.c_0) is not None else float("nan"),
     )
 
 

@@ -155,6 +155,9 @@ def fit_lines(fit: FitResult) -> list[str]:
         verdict = "   undetermined by these data" if name in fit.undetermined else ""
         unit = f" {parameter.unit}" if parameter.unit != "1" else ""
         lines.append(f"  {name:<{width}} = {parameter.value:.5g}{doubt}{unit}{verdict}")
+    if (rest := fit.c_0) is not None:
+        doubt = f" ± {rest.std:.2g}" if math.isfinite(rest.std) else ""
+        lines.append(f"  {'c_0':<{width}} = {rest.value:.5g}{doubt}, what never relaxes: 1 − Σ c_i")
     if lacking(fit):
         lines.append(
             f"  the model leaves {fit.rmse / fit.noise_floor:.2g} times the noise: it lacks something, and its numbers "

@@ -128,6 +128,16 @@ class FitResult:
         return Model.from_dict(self.model_dict)
 
     @property
+    def c_0(self) -> Parameter | None:
+        """The share that never relaxes, 1 − Σ c_i; None where the numbers are no shares."""
+        shares = [i for i, name in enumerate(self.parameters) if name.startswith("c_")]
+        if not shares or "c_0" in self.parameters:
+            return None
+        value = 1.0 - math.fsum(p.value for name, p in self.parameters.items() if name.startswith("c_"))
+        spread = math.nan if self.covariance is None else float(self.covariance[np.ix_(shares, shares)].sum())
+        return Parameter(value, "1", math.sqrt(spread) if spread >= 0.0 else math.nan)
+
+    @property
     def time_s(self) -> Array:
         """Force stamps of the first measurement."""
         return self.traces[0].time_s

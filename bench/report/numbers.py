@@ -68,7 +68,9 @@ def parameters(fit: FitView) -> str:
         styles.append("off" if undetermined else "")
     if "c_0" not in given and "c_1" in given:
         rest = 1.0 - sum(of(entry)[0] for name, entry in given.items() if str(name).startswith("c_"))
-        rows.append([symbol("c_0"), digits(rest), "–", "", "–", f"{meaning('c_0')}, from the others: 1 − Σ cᵢ"])
+        shown, doubt = measured(rest, fit.c_0_std)
+        relative = f"{digits(100 * fit.c_0_std / abs(rest), 2)} %" if rest and math.isfinite(fit.c_0_std) else "–"
+        rows.append([symbol("c_0"), shown, doubt, "", relative, f"{meaning('c_0')}, from the others: 1 − Σ cᵢ"])
     head = ["parameter", "value", "std. dev.", "unit", "relative", "meaning"]
     formula = LAWS.get(str(fit.json.get("law")), ("", ""))[1]
     said = f"<p><code>{markup.text(formula)}</code> &nbsp; <code>g(t) = c₀ + Σ cᵢ·e^(−νᵢ·t)</code></p>\n"

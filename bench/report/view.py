@@ -80,6 +80,8 @@ class FitView:
     notes: Sequence[str] = ()
     history: Mapping[str, Sequence[float]] = field(default_factory=dict)
     over_times: OverTimes | None = None
+    c_0_std: float = math.nan
+    """Standard error of the share that never relaxes."""
 
     def number(self, key: str) -> float:
         """A figure of fit.json; NaN where it is missing or null."""

@@ -225,6 +225,9 @@ class _Reading:
             return
         off = {n: q.value - self.parameters[n].value for n, q in other.parameters.items() if n in self.parameters}
         moved = [n for n, by in off.items() if abs(by) > self.parameters[n].std and self.parameters[n].value]
+        if self.covariance is not None:
+            shift = np.array([off.get(name, 0.0) for name in self.parameters])
+            self.covariance = self.covariance + np.outer(shift, shift)
         for name, by in off.items():
             p = self.parameters[name]
             self.parameters[name] = replace(p, std=float(np.hypot(p.std, by)))

@@ -81,3 +81,12 @@ def test_a_method_that_takes_the_surface_for_certain_has_its_doubt_in_its_errors
         truth = EXPONENTIAL.parameters()
         z += [(result.parameters[name].value - value) / result.parameters[name].std for name, value in truth.items()]
     assert np.mean(np.abs(z) < 2) > 0.85 and np.std(z) > 0.5
+
+
+def test_the_share_that_never_relaxes_has_an_honest_error() -> None:
+    z = []
+    for seed in range(16):
+        rest = fit(misplaced(EXPONENTIAL, seed)[0], law="exponential", order=2).c_0
+        assert rest is not None
+        z.append((rest.value - 0.6) / rest.std)
+    assert np.mean(np.abs(z) < 2) > 0.8 and 0.5 < np.std(z) < 1.6
