@@ -11,7 +11,6 @@ from typing import Any
 from bench.daily.series_file import Series
 from bench.daily.series_state import State
 from bench.daily.yaml_edit import write_whole
-from bench.report.markup import measured
 from bench.run.folder import FIT
 
 TABLE = "series.csv"
@@ -58,6 +57,8 @@ def write(series: Series, found: list[dict[str, Any]]) -> None:
 
 
 def _with_doubt(value: float | None, std: float | None) -> str:
+    from bench.report.markup import measured  # with the pages, which take a second to load
+
     if value is None:
         return "–"
     shown, doubt = measured(value, math.nan if std is None else std)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from sim.effects.reading import force
 from sim.elastic import NoPad
 from sim.pad import Pad
@@ -14,7 +16,7 @@ SHOWN = 4
 def as_given(believed: Pad, refitted: Pad, given_N: float, left_N: float) -> str:
     """A sentence on it; empty where the numbers were as good as right. `given_N`, `left_N`: RMS errors with the numbers
     as given and refitted."""
-    if isinstance(believed.law, NoPad) or given_N < NOTABLE * left_N:
+    if isinstance(believed.law, NoPad) or not NOTABLE * left_N <= given_N < math.inf:
         return ""
     before, after = _numbers(believed), _numbers(refitted)
     moved = [(abs(after[n] - v) / max(abs(v), 1e-12), n) for n, v in before.items() if n in after]
