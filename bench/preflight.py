@@ -280,7 +280,7 @@ def _travel(planned: Plan, outcomes: tuple[Outcome, ...], surface_mm: float | No
     zero = 0.0 if planned.in_air else surface_mm
     text = f"limits.position [{lowest:g}, {highest:g}]"
     if zero is None:
-        way = deepest.deepest_mm - least.highest_mm
+        way = max(deepest.deepest_mm, 0.0) - min(least.highest_mm, 0.0)
         if way > highest - lowest + TOLERANCE:
             name, path = deepest.segment.name, deepest.segment.path
             message = f"from {least.highest_mm:.3g} to {deepest.deepest_mm:.3g} mm is more than the bench's {text} has"
@@ -297,4 +297,6 @@ def _travel(planned: Plan, outcomes: tuple[Outcome, ...], surface_mm: float | No
 
 def _surface_range(planned: Plan, outcomes: tuple[Outcome, ...]) -> tuple[float, float]:
     lowest, highest = planned.limits.position_mm
-    return lowest - min(o.highest_mm for o in outcomes), highest - max(o.deepest_mm for o in outcomes)
+    # the surface itself is met from above, however far from it the steps keep
+    highest_mm, deepest_mm = min(0.0, *(o.highest_mm for o in outcomes)), max(0.0, *(o.deepest_mm for o in outcomes))
+    return lowest - highest_mm, highest - deepest_mm

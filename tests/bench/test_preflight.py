@@ -287,6 +287,12 @@ def test_travel_is_exact_once_the_surface_is_known(tmp_path: Path, bench: Bench)
     assert check(read, bench, model()).surface_mm == (-4.5, 3.0)
 
 
+def test_the_surface_is_met_within_the_travel_however_far_from_it_the_steps_keep(tmp_path: Path, bench: Bench) -> None:
+    lowest, highest = bench.limits.position
+    read = protocol(tmp_path, "{to: -4, speed: 5}")
+    assert check(read, bench, model()).surface_mm == (lowest + 4.0, highest)
+
+
 def test_arrays_belong_together(bench: Bench) -> None:
     found = check(load_protocol("staircase"), bench, load_model("polyurethane"))
     prediction = found.prediction
