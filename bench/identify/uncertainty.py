@@ -13,6 +13,7 @@ from .colour import corrected_colour, plain_colour, spread_through
 from .estimate import Estimate
 from .objective import Structure
 from .problem import Problem
+from .runs import Run
 
 TELLING = 2.0  # standard deviations of its own by which the scores must say more
 
@@ -26,8 +27,8 @@ class Spread:
 
 
 def spread_of(problem: Problem, estimate: Estimate) -> Spread:
-    """Sandwich H⁻¹ S H⁻¹ (`sandwich`). The prior of a run's doubts adds its own spread, and so do a surface, and stamps
-    of the position that may all be off together, which were taken as they are. Variables at a bound have none.
+    """Sandwich H⁻¹ S H⁻¹ (`sandwich`). The prior of a run's doubts adds its own spread, and so does what may be off all
+    along a run and was taken as it is: a surface, stamps, what an axis gives way. Variables at a bound have none.
     """
     P = estimate.structure.size
     sensitivity, errors = _per_sample(problem, estimate)
@@ -156,12 +157,17 @@ def _late(problem: Problem, estimate: Estimate) -> list[Array]:
 
 
 def _elsewhere(problem: Problem, estimate: Estimate) -> list[Array]:
-    """Of each run whose doubtful surface was taken for certain: Σ w J δF, (P,), δF what one of its deviations makes."""
-    out = []
+    """Of each run whose positions may be off and were taken as they are (a surface for certain, a way that the axis
+    gives for known): Σ w J δF, (P,), δF what one deviation of that makes."""
+    off: list[tuple[Run, Array]] = []
     for run, m in zip(problem.runs, problem.measurements, strict=True):
-        if m.surface_std_mm <= 0 or run.surface is not None:
-            continue
-        moved = replace(run, u=run.u + m.surface_std_mm / problem.depth_mm)
+        if m.surface_std_mm > 0 and run.surface is None:
+            off.append((run, np.full(run.size, m.surface_std_mm)))
+        if m.way_doubt is not None:
+            off.append((run, np.interp(run.time_s, *m.way_doubt)))
+    out = []
+    for run, by_mm in off:
+        moved = replace(run, u=run.u + by_mm / problem.depth_mm)
         here, there = (
             list(objective.simulate(r, estimate.structure, estimate.x, derivatives=True)) for r in (run, moved)
         )

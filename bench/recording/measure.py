@@ -100,12 +100,14 @@ def measurement_of(recording: Recording) -> Measurement:
     _report_spikes("position", position_time, position, notes)
     _report_spikes("force", force_time, force, notes)
     doubtful: Spans = []
-    stamp_std = 0.0
+    stamp_std, way_doubt = 0.0, None
     between = between_polls(recording.events, position_time, position, force_time, force)
     if between is not None:
         position_time, position, doubtful = between.time_s, between.position_mm, between.doubtful
         stamp_std = between.stamp_std_s
         notes += between.notes
+        if between.way_doubt_mm is not None:
+            way_doubt = between.time_s, between.way_doubt_mm
     else:
         told = np.interp(position_time, recording.motor.time_s - delays.position_s, recording.motor.command_mm)
         doubtful = _stairs(bench, position_time, told, (force_time, force), notes)
@@ -124,6 +126,7 @@ def measurement_of(recording: Recording) -> Measurement:
         notes=notes,
         doubtful=doubtful,
         stamp_std_s=stamp_std,
+        way_doubt=way_doubt,
     )
 
 

@@ -142,6 +142,9 @@ class Measurement:
 
     stamp_std_s: float = 0.0
     """By how much all stamps of the position may be early or late against those of the force, standard deviation."""
+    way_doubt: tuple[Array, Array] | None = None
+    """(s, mm), (k,) each: by how much the positions may be off, all along together, by one standard deviation of what
+    the axis gives way to the force; linear between. None where it is stiff, or its polls show it."""
 
     def position_at_forces_mm(self) -> Array:
         """The position at the stamps of the forces (m,), linear between its own."""

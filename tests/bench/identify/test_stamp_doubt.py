@@ -56,6 +56,23 @@ def test_standard_errors_grow_by_what_late_stamps_move_the_numbers() -> None:
     assert doubtful["c_1"].std > 1.5 * base["c_1"].std  # the doubt is no trifle here: else nothing was tested
 
 
+def test_standard_errors_grow_by_what_an_axis_gives_way_moves_the_numbers() -> None:
+    """Behind each step of the staircase the positions may be off by 3 µm, which die away, all of them together."""
+    certain = measured(np.random.default_rng(7))
+    t, x = certain.position_time_s, certain.position_mm
+    off_mm = np.zeros(t.size)
+    for n in range(1, t.size):
+        off_mm[n] = 0.9 * (off_mm[n - 1] + 5e-3 * (x[n] - x[n - 1]))
+    base = taken_as_stamped(certain)
+    doubtful = taken_as_stamped(replace(certain, way_doubt=(t, off_mm)))
+    moved = taken_as_stamped(replace(certain, position_mm=x + off_mm))
+    for name, one in base.items():
+        assert doubtful[name].value == pytest.approx(one.value, rel=1e-9)
+        added = np.sqrt(doubtful[name].std ** 2 - one.std**2)
+        assert added == pytest.approx(abs(moved[name].value - one.value), rel=0.15, abs=0.15 * one.std)
+    assert doubtful["c_1"].std > 1.5 * base["c_1"].std  # the doubt is no trifle here: else nothing was tested
+
+
 def test_doubtful_stamps_are_estimated_with_the_pad() -> None:
     fitted_as = functools.partial(fit, law="exponential", order=2, contact="unilateral")
     deviations, taken_as_they_are = [], []
