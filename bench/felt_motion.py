@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from bench.fitted_moves import Moves
 from bench.identify.motion import jitter
 from bench.motion_between import missed, motion_between, planned_moves
-from bench.position_noise import EDGE, PositionNoise, position_noise, resolution
+from bench.position_noise import EDGE, PositionNoise, position_noise
 from bench.profiles import Trapezoid
+from bench.readings import resolution
 from sim.jit import compiled
 
 Array = NDArray[np.float64]

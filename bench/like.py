@@ -30,7 +30,7 @@ from bench.felt_motion import felt
 from bench.identify.noise import noise_of
 from bench.identify.past import begins_inside
 from bench.identify.problem import sized
-from bench.position_noise import resolution
+from bench.readings import resolution
 from bench.recording.types import Measurement
 from bench.restamp import restamped
 from sim.grid import union

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from bench.amounts import amounts
 from bench.identify.motion import holds, jitter
+from bench.readings import resolution
 
 Array = NDArray[np.float64]
 
-ODD_STEPS = 0.05  # share of the steps between a coarse channel's values that may be less: not all values are its own
 LAGS = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32])  # samples, over which a noise with memory is seen to grow
 EDGE = 4  # samples at the ends of a hold that may still move
 LONG_ENOUGH = 3 * int(LAGS[-1])  # samples of a hold that tell of a memory
@@ -21,16 +21,6 @@ GROWS, SURE = 1.1, 5.0  # growth from a lag of one sample to longer ones that is
 AS_IT_FADES = 0.2  # of how the growths differ, that a memory which fades leaves at the most: more is motion
 KEPT = np.array([0.3, 0.4, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95])  # of a value, one sample on
 AVERAGED = np.array([2, 3, 4, 5, 6, 8, 10, 12, 16])  # samples that a moving mean is of
-
-
-def resolution(values: Array) -> float:
-    """Step of a quantised channel, 0 where its values are (nearly) all different."""
-    levels = np.unique(values)
-    if levels.size < 2 or levels.size > 0.3 * values.size:
-        return 0.0
-    steps = np.diff(levels)
-    steps = steps[steps > 1e-9 * np.ptp(values)]
-    return float(np.quantile(steps, ODD_STEPS, method="lower")) if steps.size else float(np.ptp(values))
 
 
 @dataclass(frozen=True)

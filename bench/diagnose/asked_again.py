@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.identify.motion import holds
-from bench.position_noise import resolution
+from bench.readings import resolution, runs
 from bench.recording.types import Measurement
-from bench.repeats import runs
 
 from .channel import FEW, Faults, far, not_of_the_motion, of_the_model, resting, standing_off, strays
 from .data import Prepared, prepare

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
 from bench.identify.motion import holds
-from bench.position_noise import resolution
+from bench.readings import copies, resolution, runs
 from bench.recording.types import Measurement
-from bench.repeats import copies, runs
 
 from .coarse import coarse_repeats
 from .stuck import CHANCE, FEW_REPEATS, LEAPS, equal_by_chance, no_accident, repeated, slowed

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom, poisson
 
-from bench.position_noise import resolution
+from bench.readings import resolution
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -14,7 +14,7 @@ from bench.felt_motion import Felt, felt
 from bench.identify.noise import stiffness_along
 from bench.identify.past import begins_inside
 from bench.identify.problem import must_vary, sized, touches
-from bench.position_noise import resolution
+from bench.readings import resolution
 from bench.recording.types import Measurement
 from bench.restamp import restamped
 from sim.grid import Grid, union

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.identify.motion import holds
-from bench.position_noise import resolution
+from bench.readings import resolution
 from bench.recording.types import Measurement
 
 from .noise import SETTLED_S

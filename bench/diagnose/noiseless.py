@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.position_noise import resolution
+from bench.readings import resolution, runs
 from bench.recording.types import Measurement
-from bench.repeats import runs
 
 from .channel import Faults, resting
 from .noise import force_noise, least_N

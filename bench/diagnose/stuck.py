@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, poisson
 
-from bench.position_noise import resolution
-from bench.repeats import runs
+from bench.readings import resolution, runs
 
 from .coarse import noise_steps
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from bench.errors import InputError
 from bench.motion_between import motion_between
+from bench.readings import copies
 from bench.recording.types import Measurement
-from bench.repeats import copies
 from sim.grid import union
 
 from ._kernel import Array

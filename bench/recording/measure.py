@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from bench import yamlfile
 from bench.errors import InputError
 from bench.places import Key
+from bench.readings import copies
 from bench.recording.between import Spans, between_polls
 from bench.recording.schemas import BENCH_FILE, NO_SURFACE, STOPPED
 from bench.recording.stairs import stairs
@@ -81,6 +82,7 @@ def measurement_of(recording: Recording) -> Measurement:
     position_time, position = _channel(
         "position", recording.motor.time_s - delays.position_s, recording.motor.position_mm, notes
     )
+    position_time, position = _new_ones(position_time, position, notes)
     force_time, force = _forces(recording, delays, notes)
     if position.size < 2:
         raise InputError(place, "holds fewer than two position samples", cure)
@@ -128,6 +130,18 @@ def measurement_of(recording: Recording) -> Measurement:
         stamp_std_s=stamp_std,
         way_doubt=way_doubt,
     )
+
+
+def _new_ones(time_s: Array, position_mm: Array, notes: list[str]) -> tuple[Array, Array]:
+    """Without the rows that only repeat a position, where it is written more often than it is asked for: between two
+    new ones the axis moves on, and does not stand and jump. The last row stays, for the time that it holds."""
+    again = copies(position_mm)
+    if not again.any():
+        return time_s, position_mm
+    again[-1] = False
+    every = round(again.size / np.count_nonzero(~again), 1)
+    notes.append(f"position: a new one every {every:g} samples only: those between, which repeat it, were left out")
+    return time_s[~again], position_mm[~again]
 
 
 def _stairs(

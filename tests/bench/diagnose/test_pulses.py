@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench.diagnose.pulses import LONGEST, pulses
-from bench.position_noise import resolution
+from bench.readings import resolution
 from tests.truth.cases import draw_case
 
 SEEDS = range(6)

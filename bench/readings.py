@@ -1,4 +1,4 @@
-"""Force samples that say again what was said before: runs of one value, and channels that are read more often than
+"""What a channel says, in digits: the step of its values, runs of one value, and channels that are read more often than
 they convert."""
 
 from __future__ import annotations
@@ -6,15 +6,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.position_noise import resolution
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+ODD_STEPS = 0.05  # share of the steps between a coarse channel's values that may be less: not all values are its own
 MANY = 30  # new values that leap, by which it is told
 LEAP = 1.5  # steps of the channel's digits: a slow move through coarse ones goes by single steps
 RARE = 0.01  # of those, that may be followed by another too soon: strays, lost conversions
 PART = 0.1  # of all samples that such values stand for: else they are moves between rests
+
+
+def resolution(values: Array) -> float:
+    """Step of a quantised channel, 0 where its values are (nearly) all different."""
+    levels = np.unique(values)
+    if levels.size < 2 or levels.size > 0.3 * values.size:
+        return 0.0
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-9 * np.ptp(values)]
+    return float(np.quantile(steps, ODD_STEPS, method="lower")) if steps.size else float(np.ptp(values))
 
 
 def runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

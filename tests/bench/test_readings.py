@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from numpy.typing import NDArray
 
 from bench import identify
 from bench.diagnose import diagnose
+from bench.readings import copies, rows_per_conversion
+from bench.recording import read_recording, write_csv
 from bench.recording.types import Measurement
-from bench.repeats import copies, rows_per_conversion
 from sim.model import Model
+from tests.truth.cases import null_case
 from tests.truth.laws import Power
 from tests.truth.motion import staircase
 from tests.truth.pad import Pad, simulate
@@ -20,6 +23,7 @@ from tests.truth.pad import Pad, simulate
 ROW_s = 0.0125
 PAD = Pad(Power(2.7, 0.5), (0.3, 0.12), (2.5, 0.2))
 BELIEVED = Pad(Power(2.5, 0.5), (0.26, 0.13), (2.8, 0.18))
+TRUE = {"p": 2.7, "q": 0.5, "nu_1": 2.5, "nu_2": 0.2, "c_1": 0.3, "c_2": 0.12}
 SEEDS = range(20)
 
 
@@ -83,7 +87,7 @@ def test_a_fit_leaves_the_copies_out_and_says_so(seed: int) -> None:
     fitted = identify.fit(m)
     assert fitted.law == "power" and fitted.order == 2
     assert np.sqrt(fitted.V) < 1.1 * 0.01
-    for name, true in {"p": 2.7, "q": 0.5, "nu_1": 2.5, "nu_2": 0.2, "c_1": 0.3, "c_2": 0.12}.items():
+    for name, true in TRUE.items():
         assert abs(fitted.parameters[name].value - true) < 4.5 * fitted.parameters[name].std, name
     assert any("a new one every 8 samples" in note for note in fitted.notes)
 
@@ -97,3 +101,28 @@ def test_a_diagnosis_names_them_and_nothing_else(seed: int) -> None:
     fraction = d.causes[0].parameters["fraction"]
     assert abs(fraction.value - float(np.mean(again))) < 2.0 * fraction.std
     assert d.held_out_after < 1.15 * 0.01
+
+
+@pytest.mark.parametrize("rows", [2, 4, 8])
+def test_rows_that_repeat_as_a_whole_are_left_out_whole(tmp_path: Path, rows: int) -> None:
+    """As a logger writes that is faster than what it reads: the axis does not stand and jump between."""
+    t, x, force = clean(2.0)
+    rng = np.random.default_rng(rows)
+    said = (np.arange(len(t)) // rows) * rows
+    x = np.round(x + 1e-4 * rng.standard_normal(len(t)), 4)[said]
+    force = (np.rint((force + 0.01 * rng.standard_normal(len(t))) / 0.002) * 0.002)[said]
+    write_csv(tmp_path / "rows.csv", t, x, t, force)
+    m = read_recording(tmp_path / "rows.csv").measurement()
+    assert any(f"a new one every {rows} samples" in note for note in m.notes)
+    fitted = identify.fit(m, law="power", order=2, contact="unilateral")
+    for name, true in TRUE.items():
+        assert abs(fitted.parameters[name].value - true) < 4.5 * fitted.parameters[name].std, name
+
+
+def test_positions_of_any_bench_are_taken_for_what_they_are() -> None:
+    for seed in range(20):
+        position = null_case(seed).position_mm
+        assert not copies(position[np.isfinite(position)]).any()
+    _, x, _ = clean()
+    for count_mm in (1e-6, 1e-3, 0.01, 0.1):
+        assert not copies(np.rint(x / count_mm) * count_mm).any()
