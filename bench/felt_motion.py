@@ -33,6 +33,8 @@ BLURRED = 0.3  # of a step: noise that makes a mean of readings better than one
 TOGETHER = 20  # samples that share the error of a window, about
 BESIDE = 2.5  # deviations of a reading from where its window puts it, that are more than its noise
 ASTRAY = 1.4  # times what noise makes of a window's value: so far off is it, in sines of any speed
+BETWEEN = 40  # samples with no window of their own between such as have one
+ALONE = 2.5  # times what is left of the noise on either side
 WIDTH = 2.2  # standard deviations on either side of a value
 
 
@@ -119,7 +121,24 @@ def smoothed(time_s: Array, position_mm: Array, noise: PositionNoise) -> tuple[A
     out, std = position.copy(), np.full(len(time), sigma)
     for side in (0, 1, -1):
         _windows(time, position, sigma, noise.memory, WIDTH, REACHES, side, out, std)
+    _without_strays(time, position, sigma, out, std)
     return out, std
+
+
+def _without_strays(time_s: Array, position_mm: Array, sigma: float, out: Array, std: Array) -> None:
+    """Put values with which no window of their neighbours agrees, though noise may be all that they are, on the line
+    between those neighbours. Friction that has slid to its end would keep such a stray until the axis turns."""
+    n, at = len(out), np.arange(len(out))
+    sure = np.maximum(std[np.maximum(at - BETWEEN, 0)], std[np.minimum(at + BETWEEN, n - 1)])
+    alone = std > ALONE * sure
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], alone.astype(np.int8), [0]]))).reshape(-1, 2)
+    for first, end in edges.tolist():
+        if end - first > BETWEEN or first == 0 or end == n:
+            continue
+        a, b = first - 1, end
+        line = np.interp(time_s[first:end], [time_s[a], time_s[b]], [out[a], out[b]])
+        if _by_chance((position_mm[first:end] - line) / sigma):
+            out[first:end], std[first:end] = line, max(float(std[a]), float(std[b]))
 
 
 @dataclass(frozen=True)

@@ -211,3 +211,15 @@ def test_corners_rounded_by_little_more_than_the_noise_are_met_or_doubted(width_
         said = np.interp(t, told.time_s, np.hypot(told.std_mm, told.doubt_mm))
         worst.append(np.max(np.abs(told.at(t) - x) / said))
     assert np.sum(np.array(worst) < 4.0) >= 6
+
+
+def test_no_stray_of_a_slow_swing_is_felt() -> None:
+    """Less than two counts of the scale, in seconds: no rest, and no window agrees with one sample in a thousand.
+    Friction that has slid to its end keeps what a stray would push it by until the axis turns."""
+    t = np.arange(0.0, 4.0, 1e-3)
+    true = 1.0 + 6e-4 * np.sin(2.0 * np.pi * t / 3.0)
+    off = []
+    for seed in range(30):
+        x = np.round(true + 5e-4 * np.random.default_rng(seed).standard_normal(t.size), 3)
+        off.append(float(np.abs(felt(t, x).at(t) - true)[100:-100].max()))
+    assert np.quantile(off, 0.9) < NOISE_MM / 3
