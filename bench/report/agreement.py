@@ -122,4 +122,6 @@ def lines(fits: Sequence[Mapping[str, Any]], samples: Sequence[str]) -> list[str
         if means:
             told = ", ".join(f"{m.sample} {' ± '.join(measured(m.mean, m.std))} ({m.runs})" for m in means)
             out.append(f"        {told}: {differ(chance)}")
+    if len({(fit.get("law"), fit.get("order")) for fit in fits}) > 1:
+        out.append("  (of different laws or orders numbers of one name are not the same: give --law and --order)")
     return ["do their numbers agree?", *out] if out else []

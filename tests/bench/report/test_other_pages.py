@@ -88,6 +88,9 @@ def test_a_comparison_by_sample_in_page_and_terminal(fit: FitView) -> None:
     said = lines([view.json for _, view in runs], ["soft", "soft", "hard", "hard"])
     assert any("soft 2.2410 ± 0.0072 (2), hard 2.7410 ± 0.0072 (2): further apart" in line for line in said)
     assert "By sample" not in check(comparison_page(runs)).shown
+    assert not any("--law and --order" in line for line in said)
+    mixed = [runs[0][1].json, {**runs[1][1].json, "order": 3}]
+    assert "--law and --order" in lines(mixed, ["", ""])[-1]
 
 
 def test_different_laws_and_missing_doubt_compare(fit: FitView) -> None:
