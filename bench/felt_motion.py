@@ -135,10 +135,10 @@ def _without_strays(time_s: Array, position_mm: Array, sigma: float, out: Array,
     for first, end in edges.tolist():
         if end - first > BETWEEN or first == 0 or end == n:
             continue
-        a, b = first - 1, end
-        line = np.interp(time_s[first:end], [time_s[a], time_s[b]], [out[a], out[b]])
+        beside = [first - 1, end]
+        line = np.interp(time_s[first:end], time_s[beside], out[beside])
         if _by_chance((position_mm[first:end] - line) / sigma):
-            out[first:end], std[first:end] = line, max(float(std[a]), float(std[b]))
+            out[first:end], std[first:end] = line, std[beside].max()
 
 
 @dataclass(frozen=True)

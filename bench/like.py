@@ -106,6 +106,7 @@ class Likeness:
         return "; ".join(said)
 
 
+@np.errstate(over="ignore")  # a law far too steep for the motion: whoever asked is told of that
 def likeness(model: Model, measurement: Measurement) -> Likeness:
     """The model's force over the measured motion, from rest, or from the state that serves it best where the data begin
     amid the pad's load.
@@ -114,11 +115,6 @@ def likeness(model: Model, measurement: Measurement) -> Likeness:
     mean square error at the best s without that prior. Positions whose surface is certain (CSV) are taken as they are.
     Raises InputError for numbers that are none of a bench.
     """
-    with np.errstate(over="ignore"):  # a law far too steep for the motion: whoever asked is told of that
-        return _likeness(model, measurement)
-
-
-def _likeness(model: Model, measurement: Measurement) -> Likeness:
     sized(measurement)
     alone = faults(measurement.force_N)
     flagged = ~alone.good

@@ -61,3 +61,9 @@ def copies(force: Array) -> Mask:
     every = rows + int(np.mean(single) > rows + RARE)  # between two whole numbers: the later one holds a new value
     since = np.arange(len(force)) - np.repeat(first, length)
     return np.asarray(since % every != 0)
+
+
+def said_of(again: Mask) -> str:
+    """What a note says of copies that were left out."""
+    every = round(len(again) / np.count_nonzero(~again), 1)
+    return f"a new one every {every:g} samples only: those between, which repeat it, were left out"

@@ -255,9 +255,9 @@ def validate(document: Document, cls: type[M]) -> M:
         what = "is empty" if document.data is None else "must be a mapping of `key: value` lines"
         raise document.error((), what, f"needed here: {', '.join(_required(cls)) or 'see padbench schema'}")
     wanted, own = next(((k, keys) for k, keys in KINDS.items() if set(keys) <= set(cls.model_fields)), ("", ()))
-    if not any(key in document.data for key in own):
+    if wanted and not any(key in document.data for key in own):
         for kind, keys in KINDS.items():
-            if wanted and all(key in document.data for key in keys):
+            if all(key in document.data for key in keys):
                 raise document.error((), f"is a {kind}", f"wanted here: a {wanted} (with {' and '.join(own)})")
     try:
         return cls.model_validate_json(json.dumps(document.data), strict=True)

@@ -49,10 +49,9 @@ def main(args: argparse.Namespace) -> int:
     from bench.daily.open_bench import OpenBench
 
     with OpenBench(bench) as work:
-        simulated = bench.all_simulated
 
         def right(question: str) -> bool:
-            return agreed(question, yes=args.yes, must_say=True, nobody=simulated)
+            return agreed(question, yes=args.yes, must_say=True, nobody=bench.all_simulated)
 
         wishes = doctor.Wishes(args.seconds, args.force_cap, args.press, right)
         checkup, failure = Checkup(), None

@@ -19,12 +19,11 @@ def as_given(believed: Pad, refitted: Pad, given_N: float, left_N: float) -> str
     if isinstance(believed.law, NoPad) or not NOTABLE * left_N <= given_N < math.inf:
         return ""
     before, after = _numbers(believed), _numbers(refitted)
-    moved = [(abs(after[n] - v) / max(abs(v), 1e-12), n) for n, v in before.items() if n in after]
-    most = sorted((m for m in moved if m[0] > CHANGED), reverse=True)[:SHOWN]
+    moved = {name: abs(after[name] - v) / max(abs(v), 1e-12) for name, v in before.items() if name in after}
+    most = sorted((name for name, by in moved.items() if by > CHANGED), key=lambda name: -moved[name])[:SHOWN]
     if not most:
         return ""
-    names = [name for name in before if name in {n for _, n in most}]
-    changes = ", ".join(f"{name} {before[name]:.4g} → {after[name]:.4g}" for name in names)
+    changes = ", ".join(f"{name} {before[name]:.4g} → {after[name]:.4g}" for name in before if name in most)
     return f"with its numbers as given it errs by {force(given_N)}; refitted: {changes}"
 
 

@@ -201,9 +201,9 @@ def doubtful(cause: CauseFound) -> list[Alternative]:
 def in_doubt(cause: CauseFound) -> list[Alternative]:
     """What a further test should tell from a cause, nearest first: what is not excluded; else, where the name is little
     sure, what comes nearest."""
-    near = sorted(cause.alternatives, key=lambda a: a.delta_chi2)
-    still = [a for a in near if not a.excluded]
-    return still or (near[:1] if cause.confidence < DOUBTED else [])
+    still = doubtful(cause)
+    near = sorted(still or cause.alternatives, key=lambda a: a.delta_chi2)
+    return near if still else near[: int(cause.confidence < DOUBTED)]
 
 
 def rivals(cause: CauseFound) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bench.errors import InputError
 from bench.motion_between import motion_between
-from bench.readings import copies
+from bench.readings import copies, said_of
 from bench.recording.types import Measurement
 from sim.grid import union
 
@@ -248,11 +248,7 @@ def _converted(m: Measurement, notes: list[str]) -> Measurement:
     again = copies(m.force_N)
     if not again.any():
         return m
-    every = round(len(again) / np.count_nonzero(~again), 1)
-    notes.append(
-        f"{m.name}: The force is a new one every {every:g} samples only: those between, which repeat it, were left out."
-        " (Is the load cell read more often than it converts?)"
-    )
+    notes.append(f"{m.name}: The force is {said_of(again)}. (Is the load cell read more often than it converts?)")
     return replace(m, force_time_s=m.force_time_s[~again], force_N=m.force_N[~again])
 
 

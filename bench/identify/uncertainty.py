@@ -13,7 +13,6 @@ from .colour import corrected_colour, plain_colour, spread_through
 from .estimate import Estimate
 from .objective import Structure
 from .problem import Problem
-from .runs import Run
 
 TELLING = 2.0  # standard deviations of its own by which the scores must say more
 
@@ -39,7 +38,7 @@ def spread_of(problem: Problem, estimate: Estimate) -> Spread:
     believed = np.diag(objective.prior_of(problem, estimate.structure)) * problem.noise_square
     spread = sandwich(errors, sensitivity, inverse, believed, int(free.sum()))
     covariance = spread.covariance.copy()
-    for off in [*_late(problem, estimate), *_elsewhere(problem, estimate)]:
+    for off in _taken_as_they_are(problem, estimate):
         moved = inverse @ off
         covariance += np.outer(moved, moved)
     return Spread(covariance, spread.samples)
@@ -139,41 +138,29 @@ def _per_sample(problem: Problem, estimate: Estimate) -> tuple[list[Array], list
     return sensitivities, errors
 
 
-def _late(problem: Problem, estimate: Estimate) -> list[Array]:
-    """Of each run whose doubtful stamps were taken as they are: Σ w J δF, (P,), δF what positions late by one of its
-    deviations make.
-
-    A model driven by motion that is late by τ is itself late: δF = −τ dF/dt, with the slope over the two steps beside.
+def _taken_as_they_are(problem: Problem, estimate: Estimate) -> list[Array]:
+    """Of each run whose positions may be off all along and were taken as they are: Σ w J δF, (P,), of each way in which
+    they may be, δF what one deviation of it makes: a surface for certain, what the axis gives way for known, and stamps
+    for right. A model driven by motion that is late by τ is itself late: there δF = −τ dF/dt, with the slope over the
+    two steps beside.
     """
+    structure, x = estimate.structure, estimate.x
     out = []
-    for run in problem.runs:
-        if run.stamp_std_s <= 0 or run.late is not None or run.size < 3:
-            continue
-        pieces = list(objective.simulate(run, estimate.structure, estimate.x, derivatives=True))
-        force = np.concatenate([piece.force for piece in pieces])
-        weighted = run.weight * run.stamp_std_s * np.gradient(force, run.time_s)
-        out.append(np.asarray(np.sum([p.jacobian.T @ weighted[p.at] for p in pieces], axis=0), dtype=np.float64))
-    return out
-
-
-def _elsewhere(problem: Problem, estimate: Estimate) -> list[Array]:
-    """Of each run whose positions may be off and were taken as they are (a surface for certain, a way that the axis
-    gives for known): Σ w J δF, (P,), δF what one deviation of that makes."""
-    off: list[tuple[Run, Array]] = []
     for run, m in zip(problem.runs, problem.measurements, strict=True):
-        if m.surface_std_mm > 0 and run.surface is None:
-            off.append((run, np.full(run.size, m.surface_std_mm)))
-        if m.way_doubt is not None:
-            off.append((run, np.interp(run.time_s, *m.way_doubt)))
-    out = []
-    for run, by_mm in off:
-        moved = replace(run, u=run.u + by_mm / problem.depth_mm)
-        here, there = (
-            list(objective.simulate(r, estimate.structure, estimate.x, derivatives=True)) for r in (run, moved)
-        )
-        change = np.concatenate([p.force for p in there]) - np.concatenate([p.force for p in here])
-        weighted = run.weight * change
-        out.append(np.asarray(np.sum([p.jacobian.T @ weighted[p.at] for p in here], axis=0), dtype=np.float64))
+        late = run.stamp_std_s > 0 and run.late is None and run.size >= 3
+        off_mm = [np.full(run.size, m.surface_std_mm)] if m.surface_std_mm > 0 and run.surface is None else []
+        off_mm += [np.interp(run.time_s, *m.way_doubt)] if m.way_doubt is not None else []
+        if not (late or off_mm):
+            continue
+        pieces = list(objective.simulate(run, structure, x, derivatives=True))
+        force = np.concatenate([piece.force for piece in pieces])
+        changes = [-run.stamp_std_s * np.gradient(force, run.time_s)] if late else []
+        for by_mm in off_mm:
+            moved = objective.simulate(replace(run, u=run.u + by_mm / problem.depth_mm), structure, x)
+            changes.append(np.concatenate([piece.force for piece in moved]) - force)
+        for change in changes:
+            weighted = run.weight * change
+            out.append(np.asarray(np.sum([p.jacobian.T @ weighted[p.at] for p in pieces], axis=0), dtype=np.float64))
     return out
 
 

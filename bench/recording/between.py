@@ -76,8 +76,8 @@ class Between:
     doubtful: Spans
     stamp_std_s: float
     notes: list[str]
-    way_doubt_mm: Array | None
-    """(k,) by how much what the axis gives way may be too small, one standard deviation, all along the run together."""
+    way_doubt: tuple[Array, Array] | None
+    """As `Measurement.way_doubt`."""
 
 
 @dataclass(frozen=True)
@@ -168,8 +168,8 @@ def between_polls(
     doubtful = [span for part in drawn for span in _doubtful(part, stamp_std_s, force_time_s, force_N, force_noise_N)]
     together_s = float(np.hypot(stamp_std_s, _together_s(drawn, force_time_s, force_N)))
     notes = _notes(len(drawn), way, together_s, time_s, doubtful)
-    doubt_mm = None if way is None else np.sign(way.at(stamps)) * way.std_at(stamps)
-    return Between(stamps, values[order], doubtful, together_s, notes, doubt_mm)
+    way_doubt = None if way is None else (way.time_s, np.sign(way.way_mm) * way.std_mm)
+    return Between(stamps, values[order], doubtful, together_s, notes, way_doubt)
 
 
 # -- what was commanded ------------------------------------------------------------------------------------------

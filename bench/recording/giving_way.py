@@ -74,29 +74,30 @@ def giving_way(
         off = missed_mm + way_mm
         return np.asarray(np.log(ndtr((off + half) / noise) - ndtr((off - half) / noise) + STRAY).sum(axis=-1))
 
-    times_s, later_s, compliances = TIMES_S, LATER_S, COMPLIANCES_MM_N
+    stiff = likely(np.zeros(time_s.size))
+    times_s, later_s, compliances, weight = TIMES_S, LATER_S, COMPLIANCES_MM_N, np.zeros(0)
     for _ in range(FINER):
+        if weight.size:
+            among = weight.reshape(len(compliances), len(times_s), len(later_s))
+            compliances, times_s, later_s = (
+                _finer(values, among.sum(axis=others))
+                for values, others in ((compliances, (1, 2)), (times_s, (0, 2)), (later_s, (0, 1)))
+            )
         shapes = [(_passed(force, tau), later) for tau in times_s for later in later_s]
         at_polls = np.array([np.interp(time_s - later, grid, passed) for passed, later in shapes])
         told = np.array([likely(compliance * at_polls) for compliance in compliances])
-        if told.max() < likely(np.zeros(time_s.size)) + CLEARLY:
+        if told.max() < stiff + CLEARLY:
             return None
         weight = np.exp(told - told.max())
         weight[weight < TOLD] = 0.0
         weight /= weight.sum()
-        used = compliances
-        among = weight.reshape(len(compliances), len(times_s), len(later_s))
-        times_s, later_s, compliances = (
-            _finer(values, among.sum(axis=other).ravel())
-            for values, other in ((times_s, (0, 2)), (later_s, (0, 1)), (compliances, (1, 2)))
-        )
     mean, square = np.zeros(grid.size), np.zeros(grid.size)
     for j in np.flatnonzero(weight.any(axis=0)):
         passed, later = shapes[j]
         shape = np.interp(grid - later, grid, passed)
-        mean += float(weight[:, j] @ used) * shape
-        square += float(weight[:, j] @ used**2) * shape**2
-    compliance = float(weight.sum(axis=1) @ used)
+        mean += float(weight[:, j] @ compliances) * shape
+        square += float(weight[:, j] @ compliances**2) * shape**2
+    compliance = float(weight.sum(axis=1) @ compliances)
     return GivingWay(grid, mean, np.sqrt(np.maximum(square - mean**2, 0.0)), compliance)
 
 

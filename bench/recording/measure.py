@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from bench import yamlfile
 from bench.errors import InputError
 from bench.places import Key
-from bench.readings import copies
+from bench.readings import copies, said_of
 from bench.recording.between import Spans, between_polls
 from bench.recording.schemas import BENCH_FILE, NO_SURFACE, STOPPED
 from bench.recording.stairs import stairs
@@ -106,10 +106,8 @@ def measurement_of(recording: Recording) -> Measurement:
     between = between_polls(recording.events, position_time, position, force_time, force)
     if between is not None:
         position_time, position, doubtful = between.time_s, between.position_mm, between.doubtful
-        stamp_std = between.stamp_std_s
+        stamp_std, way_doubt = between.stamp_std_s, between.way_doubt
         notes += between.notes
-        if between.way_doubt_mm is not None:
-            way_doubt = between.time_s, between.way_doubt_mm
     else:
         told = np.interp(position_time, recording.motor.time_s - delays.position_s, recording.motor.command_mm)
         doubtful = _stairs(bench, position_time, told, (force_time, force), notes)
@@ -139,8 +137,7 @@ def _new_ones(time_s: Array, position_mm: Array, notes: list[str]) -> tuple[Arra
     if not again.any():
         return time_s, position_mm
     again[-1] = False
-    every = round(again.size / np.count_nonzero(~again), 1)
-    notes.append(f"position: a new one every {every:g} samples only: those between, which repeat it, were left out")
+    notes.append(f"position: {said_of(again)}")
     return time_s[~again], position_mm[~again]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.report import FitView, PlanView, write_comparison, write_plan
-from bench.report.agreement import Entry, agreement, by_sample, differ, lines
+from bench.report.agreement import Entry, OfSample, agreement, by_sample, differ, lines
 from bench.report.compare import comparison_page
 from bench.report.planned import plan_page
 
@@ -61,10 +61,10 @@ def test_samples_are_held_against_the_scatter_of_their_repeats() -> None:
     """Two samples of two runs, a unit apart each: F = 2 d² on 1 and 2 degrees, whose 5 % point is 18.513 (d = 3.042)
     and whose 1 % point is 98.50 (d = 7.018)."""
 
-    def told(d: float, std: float = 1e-6) -> tuple[list[tuple[str, int, float, float]], str]:
+    def told(d: float, std: float = 1e-6) -> tuple[list[OfSample], str]:
         values = [0.0, 1.0, d, d + 1.0]
         means, chance = by_sample([Entry(i, v, std, "N", False) for i, v in enumerate(values)], ["a", "a", "b", "b"])
-        return [tuple(m) for m in means], differ(chance)  # type: ignore[misc]
+        return means, differ(chance)
 
     assert told(3.0)[1] == "no further apart than repeats"
     assert told(3.1)[1].startswith("perhaps apart: repeats scatter so far in 4.")
