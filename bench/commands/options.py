@@ -41,7 +41,7 @@ def add_structure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--law", default="auto", help="exponential, power, polynomial, spline or auto (default)")
     parser.add_argument("--order", default="auto", help="relaxation modes: 1 to 8, or auto (default)")
-    parser.add_argument("--degree", type=int, metavar="N", help="degree of a polynomial law")
+    parser.add_argument("--degree", type=int, metavar="N", help="of a polynomial law; with auto, of the one tried")
     parser.add_argument(
         "--contact", default="auto", choices=["auto", "bonded", "unilateral"], help="default: %(default)s"
     )

@@ -30,7 +30,7 @@ BIASED = 1.5  # times the errors drawn: what is drawn about is smooth already, a
 BENT = 3.0  # times what is left of the noise in rests and planned moves: those may be bent, too
 TOGETHER = 7  # entries whose scatter is taken for one
 MEDIAN = 0.455  # of a normal variable's square, over its mean
-SEEN = 0.3  # of the noise: less changes nothing
+SEEN = 0.3  # of the noise, and of the noise of a mean: less changes nothing
 
 
 def felt_errors(prepared: Prepared, fit: Fit, errors_mm: Array) -> FeltErrors:
@@ -67,8 +67,10 @@ def felt_errors(prepared: Prepared, fit: Fit, errors_mm: Array) -> FeltErrors:
     at = prepared.at[data.weight[prepared.at] > 0.0]
     leapt_N = leaps(modelled[at], data.force_N[at], prepared.without_felt_N[at])
     own_N2[at] = np.maximum(own_N2[at], leapt_N**2)
-    least = (SEEN * prepared.noise.force_N) ** 2
-    own_N, shared_N = (np.sqrt(np.where(square > least, square, 0.0)) for square in (own_N2, shared_N2))
+    least_N2 = (SEEN * prepared.noise.force_N) ** 2
+    alike = np.maximum(np.bincount(stretch, data.weight), 1.0)[stretch]  # the mean of so many tells of less
+    own_N = np.sqrt(np.where(own_N2 > least_N2, own_N2, 0.0))
+    shared_N = np.sqrt(np.where(shared_N2 > least_N2 / alike, shared_N2, 0.0))
     return FeltErrors(own_N, shared_N, stretch, late_s)
 
 

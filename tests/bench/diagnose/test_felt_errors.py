@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from numpy.typing import NDArray
 from bench.config import load_model
 from bench.diagnose import diagnose
 from bench.diagnose.data import prepare
+from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.felt_errors import felt_errors, redrawn
+from bench.diagnose.refit import force_at, refit
 from bench.identify.motion import holds
 from bench.recording.types import Measurement
 from sim.model import Model
@@ -73,6 +76,33 @@ def test_rests_that_a_fit_meets_are_not_in_doubt(seed: int) -> None:
     for hold in holds(data.time_s, data.position_mm):
         resting[hold] = data.weight[hold] > 0.0
     assert np.median(felt.total_N[resting]) < prepared.noise.force_N
+
+
+def test_a_rest_that_friction_holds_is_off_by_no_more_than_said(tmp_path: Path) -> None:
+    """Its mean is told to a fiftieth of the noise: what a tenth of a micrometre makes of a slider's spring is more."""
+    pad = load_model("polyurethane").to_dict()["pad"]
+    model = {"pad": pad, "effects": [{"id": "friction", "form": "coulomb", "coulomb": 0.05}]}
+    truth = tmp_path / "truth.yaml"
+    truth.write_text(json.dumps(model))
+    stairs = [{"to": to, "speed": 20, "hold": 1.5} for to in (0.6, 1.2, 1.8, 2.4, 1.8, 1.2, 0.6)]
+    off = []
+    for seed in range(1, 4):
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        done = run(folder, {**SHORT, "steps": stairs}, simulation={"pad": str(truth), "seed": seed})
+        m = done.recording.measurement()
+        p = prepare(m, np.ones(len(m.force_N), dtype=bool))
+        structure = believed_structure(Model.from_dict(model), p)
+        fit = refit(p.short, structure, structure.x(structure.pad.x()), 30, 1e-8)
+        told = felt_errors(p, fit, redrawn(p, np.random.default_rng(seed))).shared_N
+        left = p.full.force_N - force_at(p.full, fit.structure, fit.x)
+        for hold in holds(p.full.time_s, p.full.position_mm):
+            counted = np.flatnonzero(p.full.weight[hold]) + hold.start
+            if len(counted) > 200:
+                std = np.hypot(told[counted].mean(), p.noise.force_N / np.sqrt(len(counted)))
+                off.append(left[counted].mean() / std)
+    assert len(off) > 10
+    assert 0.4 < np.sqrt(np.mean(np.square(off))) < 1.6, off
 
 
 @pytest.mark.long
