@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 from bench.config import Bench
 from bench.places import Key
 from bench.protocol import Approach, DepthStep, FlatStep, ForceStep, Protocol
-from bench.rates import force_latency_s, speed_step_mm_s, streams, too_far_behind, too_rare
+from bench.rates import force_latency_s, made_speed_mm_s, speed_step_mm_s, streams, too_far_behind, too_rare
 from bench.trajectory import Profile, braking_distance
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ class _Planner:
         )
         slowest = self.speed_step_mm_s
         if allowed >= step.speed:
-            return self._nearest(step.speed)
+            return made_speed_mm_s(step.speed, slowest)
         pad = f"{stiffness:.3g} N/mm" if known else f"{UNKNOWN_STIFFNESS_N_mm:g} N/mm (taken for want of a model)"
         message = (
             f"approaches {step.to_force:g} N at {allowed:.3g} mm/s, not at the {step.speed:g} mm/s asked for: seen "
@@ -267,14 +267,9 @@ class _Planner:
         self._once(flat.name, message, (*flat.path, "speed"), severity="notice")
         return allowed
 
-    def _nearest(self, speed: float) -> float:
-        """The speed that the motor makes of one that is asked for: at least its slowest."""
-        step = self.speed_step_mm_s
-        return max(round(speed / step), 1) * step if step else speed
-
     def _made(self, name: str, path: tuple[Key, ...], speed: float) -> float:
         """The speed that the motor makes of the one asked for, which is said where it is another."""
-        made = self._nearest(speed)
+        made = made_speed_mm_s(speed, self.speed_step_mm_s)
         if speed < 0.5 * self.speed_step_mm_s:
             message = f"speed: {speed:g} mm/s is less than this motor makes: its slowest is {made:g} mm/s"
             self._once(name, message, path, "move faster, or use a motor that is streamed")

@@ -20,7 +20,7 @@ from bench.places import Key
 from bench.plan import Plan, Problem, Segment, plan
 from bench.predict import LONGEST_S, Prediction, TooLong, predict
 from bench.protocol import Approach, Protocol
-from bench.rates import force_rate_Hz, motor_rate_Hz, stairs_mm
+from bench.rates import at_least, force_rate_Hz, motor_rate_Hz, stairs_mm
 
 if TYPE_CHECKING:
     from sim.model import Model
@@ -63,6 +63,8 @@ class Preflight:
     duration_s: float
     approach_s: float
     samples: dict[str, int]
+    at_least: bool
+    """Whether there may be more samples than that: a device is polled, and taken for as slow as it may be."""
     surface_mm: tuple[float, float] | None
     believed: bool
 
@@ -158,6 +160,7 @@ def check(
             "motor": round(total_s * motor_rate_Hz(bench, protocol.sampling.motor)),
             "load_cell": round(total_s * force_rate_Hz(bench, protocol.sampling.load_cell)),
         },
+        at_least=at_least(bench, "motor") or at_least(bench, "load_cell"),
         surface_mm=None if planned.in_air else _surface_range(planned, outcomes),
         believed=believed is not None,
     )

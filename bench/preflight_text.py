@@ -30,7 +30,8 @@ def render(preflight: Preflight, width: int, *, errors: bool = True) -> list[str
     if not plan.in_air:
         before = f"tare and approach take {preflight.approach_s:.0f} s at most"
     samples = f"{preflight.samples['motor']} motor and {preflight.samples['load_cell']} force samples"
-    lines.append(f"{most}{_clock(preflight.duration_s)} of steps; {before}; about {samples}")
+    few = "at least" if preflight.at_least else "about"
+    lines.append(f"{most}{_clock(preflight.duration_s)} of steps; {before}; {few} {samples}")
     force = [o.peak_N for o in preflight.outcomes if not math.isnan(o.peak_N)]
     if force and not plan.in_air:
         lines.append(f"peak force {max(force):.3g} N of {plan.limits.force_N:g} N allowed")

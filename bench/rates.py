@@ -43,6 +43,12 @@ def speed_step_mm_s(bench: Bench) -> float:
     return max((field.factor for field in fields if field.variable == "speed" and field.type != "f32"), default=0.0)
 
 
+def made_speed_mm_s(speed_mm_s: float, step_mm_s: float) -> float:
+    """The speed that a motor makes of one that is asked for, which counts speeds in these steps: at least one of them;
+    any speed where that is 0."""
+    return max(round(speed_mm_s / step_mm_s), 1) * step_mm_s if step_mm_s else speed_mm_s
+
+
 def motor_rate_Hz(bench: Bench, asked_Hz: float | None = None) -> float:
     """Samples a second to expect of the motor; `asked_Hz` is the protocol's wish, the wire's limit stands above it."""
     spec = bench.motor
@@ -64,6 +70,11 @@ def force_rate_Hz(bench: Bench, asked_Hz: float | None = None) -> float:
         return min(asked_Hz or spec.rate or most, most)
     usual, exchange_s = _polled(bench, "load_cell")
     return min(asked_Hz or spec.rate or usual, 1.0 / exchange_s)
+
+
+def at_least(bench: Bench, device: Literal["motor", "load_cell"]) -> bool:
+    """Whether a rate is that of a device which thinks as long as it may before each answer: most are quicker."""
+    return not streams(bench) if device == "motor" else bench.load_cell.driver not in _LINES
 
 
 def force_latency_s(bench: Bench, asked_Hz: float | None = None) -> float:

@@ -255,7 +255,7 @@ find it by its id.
     EFFECT = Effect(
         id="gain_error",
         what="The force is off by a factor.",
-        says="the force is off by a factor of 1 + {gain:.4g}",
+        says="the force is {gain:percent} too {gain:large/small}",
         check="calibrate the load cell with a known weight",
         reference="…",
         forms=(
@@ -278,10 +278,13 @@ find it by its id.
 3. Say what a fit needs: `amplitude` for the number that switches the effect off at 0, `starts` for shapes,
    `floor` for values that no data can show, `fixed` for choices. A lower bound above 0 means a fit on the logarithm.
    `of_motion=False` where it runs in time or stands at a level: one press and one hold then suffice for a sure name.
-   A form of it that goes with the motion all the same says so.
+   A form of it that goes with the motion all the same says so. `says` is the sentence that a diagnosis prints: the
+   amplitude stands in it as people read it, N and N/s in mN (`{bias:force}`, `{rate:milli}`), s in ms, shares in per
+   cent (`{gain:percent}`); `sim/effects/reading.py` has the ways to write a number.
 4. Give the family the shapes its physics takes, the first parameters the same in all.
-5. `tests/sim/test_effects.py` tries every form by itself and in all pairs, and has the parameters of each effect that
-   a user must give in `CONTRACT`: add those of yours there, and its physics beside, against a closed form.
+5. `tests/sim/test_effects.py` (set up with `.[test]`, as in the README) tries every form by itself and in all pairs,
+   and has the parameters of each effect that a user must give in `CONTRACT`: add those of yours there, and its physics
+   beside, against a closed form.
 6. A line in `GROUPS` of `docs/effects.py` gives it a place on this page, one in `NAMES` of `bench/diagnose/words.py`
    its name in plain words (without, it is called by its id).
 """
@@ -290,6 +293,9 @@ find it by its id.
 def page() -> str:
     """The text of docs/effects.md."""
     effects = all_effects()
+    homeless = sorted(set(effects) - {name for names in GROUPS.values() for name in names})
+    if homeless:
+        raise ValueError(f"{', '.join(homeless)}: a line in GROUPS of docs/effects.py gives it a place on the page")
     out = [HEAD]
     for group, names in GROUPS.items():
         listed = ", ".join(f"[{name}](#{name})" for name in names)

@@ -24,7 +24,7 @@ from bench.protocol import Approach
 from bench.recording.types import ForceChannel, MotorChannel, Recording, StepMark
 from bench.run.approach import tare, touch_off
 from bench.run.loop import Script
-from bench.run.motion import Mover, Shape
+from bench.run.motion import Mover
 
 NUDGE_MM, NUDGE_MM_S = 0.1, 0.5
 NUDGE_SHARE = 0.2
@@ -46,9 +46,6 @@ IN_S, OUT_S, RESTED_S = 0.3, 0.4, 2.0
 OLD_DAYS = 400
 TURNED_OVER = ("tension limit", "load_cell.sign")
 """What the run's own judges say where a press pulls."""
-
-LATE_S = 2e-4
-"""A delay that differs from the bench file's by less costs less than the noise at any usual speed."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +145,7 @@ def _in_air(work: OpenBench, seconds: float) -> Script[_Air]:
     """Stand, then step away from the pad and back, as fast as the limits allow. Nothing is computed meanwhile: there
     is a motor to feed."""
     notebook, limits = work.notebook, work.bench.limits
-    mover = Mover(work.loop, Shape(limits.acceleration))
+    mover = Mover(work.loop, work.shape(limits.acceleration))
     start = mover.here()
     lowest, highest = limits.position
     way = -STEP_MM if start - STEP_MM >= lowest else STEP_MM
@@ -229,7 +226,7 @@ def _press(work: OpenBench, wishes: Wishes, checkup: Checkup) -> None:
 def _strokes(work: OpenBench, cap_N: float) -> Script[Recording]:
     """Find the pad, press it to a share of the cap, and stroke into it and out again, each time faster."""
     loop, limits, notebook = work.loop, work.bench.limits, work.notebook
-    mover = Mover(loop, Shape(limits.acceleration))
+    mover = Mover(loop, work.shape(limits.acceleration))
     start = mover.here()
     notebook.clear()
     air = yield from tare(loop, mover, APPROACH, 1.0)
@@ -261,18 +258,8 @@ def _strokes(work: OpenBench, cap_N: float) -> Script[Recording]:
 def _delay(work: OpenBench, checkup: Checkup, where: str, found: delay.Delay, *, told: bool) -> None:
     timing = work.bench.timing
     known_s = timing.force_delay - timing.position_delay
-    shown = f"force {1e3 * found.delay_s:+.2f} ± {1e3 * found.std_s:.2f} ms late against position ({found.how})"
-    off_s = found.delay_s - known_s
-    figures = {where: found.to_json(), "in_bench_file_s": known_s}
-    if not told:
-        findings = []
-    elif abs(off_s) > max(LATE_S, 3.0 * found.std_s):
-        means = f"the bench file says {1e3 * known_s:+.2f} ms: at 80 mm/s that is {80e3 * abs(off_s):.0f} µm of depth"
-        do = "--write FILE puts it into `timing`; check the amplifier's filter too"
-        findings = [Finding("delay", shown, False, means, do)]
-    else:
-        findings = [Finding("delay", shown)]
-    checkup.add("delay", figures, findings)
+    findings = [delay.judged(found, known_s)] if told else []
+    checkup.add("delay", {where: found.to_json(), "in_bench_file_s": known_s}, findings)
 
 
 def _lines(work: OpenBench, checkup: Checkup) -> None:

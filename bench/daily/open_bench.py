@@ -15,7 +15,7 @@ from bench.daily.notebook import Notebook
 from bench.errors import InputError, PadbenchError, Refused, Stopped
 from bench.plan import plan
 from bench.protocol import DepthStep, Finish, Protocol
-from bench.rates import motor_rate_Hz
+from bench.rates import motor_rate_Hz, speed_step_mm_s
 from bench.recording.types import ForceChannel
 from bench.run.axis import Axis
 from bench.run.loop import Loop, Script
@@ -60,7 +60,7 @@ class OpenBench:
         monitor = Monitor(envelope_of(bench, planned))
         self.loop = Loop(self.rig, self.axis, monitor, self.notebook, self.operator)
         self.run = Run(self.loop, protocol, bench, planned)
-        self.mover = Mover(self.loop, Shape(min(GENTLE_MM_S2, limits.acceleration)))
+        self.mover = Mover(self.loop, self.shape(min(GENTLE_MM_S2, limits.acceleration)))
         self.clock = self.rig.clock
         self._cell: LoadCellIdentity | None = None
 
@@ -68,6 +68,10 @@ class OpenBench:
     def virtual(self) -> bool:
         """A simulated bench on the virtual clock: waiting takes no time."""
         return self.rig.world is not None and not self.rig.world.clock.wall
+
+    def shape(self, acceleration_mm_s2: float) -> Shape:
+        """How the motor of this bench moves with such an acceleration."""
+        return Shape(acceleration_mm_s2, speed_step_mm_s=speed_step_mm_s(self.bench))
 
     # -- looking -----------------------------------------------------------------------------------------------
 

@@ -27,6 +27,7 @@ BEYOND = 3.0  # standard deviations of touch-off and tare, within which neither 
 MOST_LEFT, SPEAKS = 0.6, 0.01  # of what is left, and of the noise power: a cause beside a far larger one takes so much
 RIVAL = 25.0  # Δχ², rescaled by what is left: less excludes no rival
 FEWEST = 3  # samples at fault that are called a fault
+MOSTLY = 0.8  # of the samples: a limit that so many are beyond is the force itself
 FURTHER = 50.0  # Δχ² that a further cause takes at the least: less is hardly to be seen beside the first
 SHARE = 0.008  # of what all causes take together: what a further cause must take at the least
 EXACT = 2e-4  # the same, of one that takes most of what a far larger one leaves: no shape is so exact
@@ -152,9 +153,12 @@ def _inside(p: Parameter, value: float) -> bool:
 
 
 def _ends(fit: Fit, prepared: Prepared) -> bool:
-    """Whether a limit shows in more than a sample or two, left out or not, or in one that no noise puts there."""
+    """Whether a limit shows in more than a sample or two, left out or not, or in one that no noise puts there; and not
+    in nearly all of them."""
     full, at = prepared.full, prepared.at
     beyond = beyond_limit(full, fit)[at]
+    if np.mean(beyond[full.weight[at] > 0]) > MOSTLY:
+        return False
     if np.count_nonzero(beyond) >= FEWEST:
         return True
     unlimited = force_at(full, *reduced(fit, len(fit.structure.causes) - 1))

@@ -162,6 +162,7 @@ def _narrowed(p: Parameter, reach: Reach, longest_mm: float) -> Parameter:
 
 def _within(p: Parameter, lower: float, upper: float, starts: Sequence[float], default: float) -> Parameter:
     """A parameter between other bounds, where there is anything between them."""
+    lower, upper = max(lower, p.lower), min(upper, p.upper)  # beyond those no model file holds it
     if lower >= upper:
         return p
     starts = tuple(v for v in starts if lower <= v <= upper)

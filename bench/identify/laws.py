@@ -20,6 +20,8 @@ from .runs import Run
 
 Named = list[tuple[str, float, str]]
 
+LEAST_GAIN = 1e-12  # N/mm: a model file holds no pad without a stiffness, and one that bears nothing is to simulate too
+
 
 @dataclass(frozen=True)
 class Family:
@@ -41,7 +43,9 @@ class Family:
         """The `elastic` entry of a model file."""
         if self.name == "polynomial":
             return {"law": self.name, "alpha": [0.0] + [value for _, value, _ in numbers]}
-        return {"law": self.name} | {name: value for name, value, _ in numbers}
+        entry = {name: value for name, value, _ in numbers}
+        gain = next(iter(entry))
+        return {"law": self.name} | entry | {gain: max(entry[gain], LEAST_GAIN)}
 
     def of_run(self, run: Run, dt_s: Array, u: Array, theta: Array, slopes: bool = True) -> tuple[Array, Array]:
         """`shape` over samples of one run, which may be in doubt itself (`nuisance.Movable`).

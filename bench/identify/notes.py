@@ -100,7 +100,8 @@ def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findi
     deepest = depth > 0.7 * depth.max()
     if float(np.mean(force[deepest])) < -3 * noise.force_N:
         out.append(
-            "The force is negative at depth: its sign is reversed (load cell `sign: -1`), or this is no pad pressed in."
+            "The force is negative at depth: its sign is reversed (load cell `sign: -1`; of a CSV"
+            " `--units force=-N`), or this is no pad pressed in."
         )
         every.spoilt |= EVERYTHING
     elif top < 10 * noise.force_N:

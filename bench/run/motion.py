@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bench.run.axis import Axis, Curve
+from bench.rates import made_speed_mm_s
+from bench.run.axis import Axis
 from bench.run.loop import Loop, Script, Window
 from bench.trajectory import Profile
 
@@ -16,10 +17,12 @@ STANDING_MM = 2e-3
 
 @dataclass(frozen=True)
 class Shape:
-    """How this run moves: acceleration (mm/s²) and, for S-curves, jerk (mm/s³; None: trapezoid)."""
+    """How this run moves: acceleration (mm/s²) and, for S-curves, jerk (mm/s³; None: trapezoid); and the steps in which
+    the motor counts speeds (0: any)."""
 
     acceleration_mm_s2: float
     jerk_mm_s3: float | None = None
+    speed_step_mm_s: float = 0.0
 
     def profile(self, start_mm: float, end_mm: float, speed_mm_s: float) -> Profile:
         """A rest-to-rest profile of this shape."""
@@ -44,7 +47,7 @@ class Mover:
         start = self.here()
         if abs(target_mm - start) < 1e-9:
             return
-        self._follow(self.shape.profile(start, target_mm, speed_mm_s), speed_mm_s)
+        self._follow(start, target_mm, speed_mm_s)
         while not self.axis.ended(self.clock.now()):
             yield
 
@@ -57,7 +60,7 @@ class Mover:
         loop = self.loop
         if abs(target_mm - start) < 1e-9:
             return False
-        self._follow(self.shape.profile(start, target_mm, speed_mm_s), speed_mm_s)
+        self._follow(start, target_mm, speed_mm_s)
         seen = loop.force_count
         while not self.axis.ended(self.clock.now()):
             if loop.force_count != seen:
@@ -103,5 +106,7 @@ class Mover:
         """Keep no more samples."""
         self.loop.window = None
 
-    def _follow(self, curve: Curve, speed_mm_s: float) -> None:
+    def _follow(self, start_mm: float, end_mm: float, asked_mm_s: float) -> None:
+        speed_mm_s = made_speed_mm_s(asked_mm_s, self.shape.speed_step_mm_s)
+        curve = self.shape.profile(start_mm, end_mm, speed_mm_s)
         self.axis.follow(curve, speed_mm_s, self.shape.acceleration_mm_s2)

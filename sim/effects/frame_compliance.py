@@ -138,7 +138,7 @@ def _compliance(what: str) -> Parameter:
 
 
 def _preload(what: str) -> Parameter:
-    return Parameter("preload", "N", 1e-2, 1e4, 2.0, what, starts=(2.0,))
+    return Parameter("preload", "N", 1e-6, 1e7, 2.0, what, starts=(2.0,))
 
 
 def _relative(name: str, where: str) -> Parameter:
@@ -229,7 +229,7 @@ EFFECT = Effect(
                 _compliance("deflection per newton, the mean of both ways"),
                 Parameter("share", "1", 0.0, 1.0, 0.3, "share of the joints that slip", starts=(0.3,)),
                 Parameter(
-                    "slip_force", "N", 1e-3, 1e4, 0.3, "half the change of force before they slip", starts=(0.1, 1.0)
+                    "slip_force", "N", 1e-6, 1e7, 0.3, "half the change of force before they slip", starts=(0.1, 1.0)
                 ),
             ),
             sought=False,

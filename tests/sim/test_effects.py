@@ -5,12 +5,14 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from textwrap import dedent
 
 import numpy as np
 import pytest
 import yaml
 from numpy.testing import assert_allclose
 
+from docs.effects import RECIPE
 from sim.effects import Active, Parameter, all_effects, effect
 from sim.elastic import Exponential
 from sim.grid import union
@@ -259,30 +261,6 @@ class TestFiles:
             Model.from_dict({"pad": {"elastic": {"law": "none"}}, "effects": [entry]})
 
 
-ONE_FILE = """
-from sim.effects.base import Effect, Form, Parameter
-from sim.jit import State, block
-
-
-@block
-def tilt(dt: float, force: float, state: State, p: State) -> float:
-    return force * (1.0 + p[0])
-
-
-EFFECT = Effect(
-    id="gain_error",
-    what="The force is off by a factor.",
-    forms=(
-        Form(
-            "constant",
-            "at all forces",
-            (Parameter("gain", "1", -0.5, 0.5, 0.1, "relative error", required=True, amplitude=True),),
-            {"sensor": tilt},
-        ),
-    ),
-)
-"""
-
 USE_IT = """
 import sys
 import sim.effects
@@ -294,16 +272,18 @@ model = Model.from_dict(
     {"pad": {"elastic": {"law": "exponential", "m": 2.0, "b": 0.0}}, "effects": [{"id": "gain_error", "gain": 0.25}]}
 )
 print(model.simulate([0.0, 1.0], [0.0, 1.0])[1], model.plant().step(0.0, 1.0))
+print(sim.effects.effect("gain_error").explanation({"gain": 0.05}))
 """
 
 
 def test_a_new_cause_is_one_file(tmp_path: Path) -> None:
-    """In a process of its own, as the list of effects is made once."""
+    """The recipe's own, in a process of its own, as the list of effects is made once."""
     folder = tmp_path / "more"
     folder.mkdir()
-    (folder / "gain_error.py").write_text(ONE_FILE, encoding="utf-8")
+    code = [line for line in RECIPE.splitlines() if line.startswith("    ") or not line]
+    (folder / "gain_error.py").write_text(dedent("\n".join(code)), encoding="utf-8")
     result = subprocess.run(
         [sys.executable, "-c", USE_IT, str(folder)], capture_output=True, text=True, check=False, cwd=Path.cwd()
     )
     assert result.returncode == 0, result.stderr
-    assert result.stdout.split() == ["2.5", "2.0"]
+    assert result.stdout.splitlines() == ["2.5 2.0", "the force is 5 % too large"]

@@ -18,6 +18,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import minimize_scalar
 
 from bench import identify
+from bench.daily.checkup.finding import Finding
 from bench.diagnose.data import prepare
 from bench.diagnose.diagnose import believed_structure
 from bench.diagnose.refit import mean_square, refit
@@ -40,6 +41,12 @@ SMOOTH_S = 0.003
 SIGNIFICANT = 30.0
 """F statistic beyond which the force has to do with the motion at all."""
 
+LATE_S = 2e-4
+"""A delay that differs from the bench file's by less costs less than the noise at any usual speed."""
+
+UNSEEN_S = 1e-3
+"""Two deviations of a delay that leave it unknown: so late a force is a cause that a diagnosis finds."""
+
 BLOCK_S = 0.05
 """Errors hang together over about so long; the doubt is taken from blocks of this length."""
 
@@ -56,6 +63,21 @@ class Delay:
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
         return dict(vars(self))
+
+
+def judged(found: Delay, known_s: float) -> Finding:
+    """A delay against that of the bench file: another one, the same, or not known well enough to say."""
+    shown = f"force {1e3 * found.delay_s:+.2f} ± {1e3 * found.std_s:.2f} ms late against position ({found.how})"
+    off_s, doubt_s = abs(found.delay_s - known_s), 2.0 * found.std_s
+    if off_s > max(LATE_S, 1.5 * doubt_s):
+        means = f"the bench file says {1e3 * known_s:+.2f} ms: at 80 mm/s that is {80e3 * off_s:.0f} µm of depth"
+        do = "--write FILE puts it into `timing`; check the amplifier's filter too"
+        return Finding("delay", shown, False, means, do)
+    if off_s > max(LATE_S, doubt_s) or doubt_s > UNSEEN_S:
+        means = f"{1e3 * (off_s + doubt_s):.1f} ms cannot be told from the {1e3 * known_s:g} ms of the bench file"
+        do = "a run of fast moves on a pad tells it better: its diagnosis names a late force, and by how much"
+        return Finding("delay", shown, None, means, do)
+    return Finding("delay", shown)
 
 
 def in_contact(recording: Recording) -> Delay | None:

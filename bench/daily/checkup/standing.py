@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bench.config import Bench
 from bench.daily.checkup.finding import Finding
-from bench.rates import force_rate_Hz, motor_rate_Hz
+from bench.rates import at_least, force_rate_Hz, motor_rate_Hz
 from bench.recording.types import ForceChannel, MotorChannel
 from bench.run.touchoff import air_of
 
@@ -36,10 +36,11 @@ def rates(bench: Bench, motor: MotorChannel, cell: ForceChannel) -> tuple[dict[s
     """Samples a second against what the lines can carry, gaps, and ages on arrival."""
     figures: dict[str, Any] = {}
     findings = []
-    for name, channel, expected_Hz in (
+    each: list[tuple[Literal["motor", "load_cell"], MotorChannel | ForceChannel, float]] = [
         ("motor", motor, motor_rate_Hz(bench)),
         ("load_cell", cell, force_rate_Hz(bench)),
-    ):
+    ]
+    for name, channel, expected_Hz in each:
         steps = np.diff(channel.time_s)
         if steps.size < 8:
             findings.append(Finding(f"{name} rate", f"{steps.size + 1} samples", False, "it hardly answers", CABLE))
@@ -53,7 +54,8 @@ def rates(bench: Bench, motor: MotorChannel, cell: ForceChannel) -> tuple[dict[s
             "age_ms": float(np.median(age_ms)),
             "oldest_ms": float(age_ms.max()),
         }
-        shown = f"{rate:.0f} a second ({expected_Hz:.0f} expected), {np.median(age_ms):.1f} ms old on arrival"
+        expected = f"{'at least ' if at_least(bench, name) else ''}{expected_Hz:.0f} expected"
+        shown = f"{rate:.0f} a second ({expected}), {np.median(age_ms):.1f} ms old on arrival"
         if rate < SLOW_SHARE * expected_Hz:
             means = "fast ramps get fewer samples, and a stop comes later"
             findings.append(Finding(f"{name} rate", shown, False, means, SLOWER[name]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,23 @@ def test_a_bench_in_order_is_well_and_every_figure_is_there(padbench, monkeypatc
     assert figures["direction"]["moved_mm"] == pytest.approx(0.1, abs=0.003)
     assert figures["delay"]["in_air"] is None
     assert not worlds[0].plant.servo_on
+
+
+def test_a_motor_that_counts_speeds_in_whole_millimetres_is_examined(padbench):
+    """Its slowest is twice the speed of the check-up's first move."""
+    found = examined(padbench, "simulated_smc_lec")
+    assert found["well"] and found["figures"]["direction"]["moved_mm"] == pytest.approx(0.1, abs=0.02)
+    said = [f["shown"] for f in found["findings"] if f["check"] == "motor rate"]
+    assert len(said) == 1 and "(at least " in said[0], "its map has the longest that it may think"
+
+
+@pytest.mark.parametrize(
+    ("late_ms", "std_ms", "ok"), [(0.05, 0.1, True), (1.0, 0.38, None), (0.3, 0.6, None), (1.0, 0.1, False)]
+)
+def test_a_delay_that_cannot_be_told_from_none_is_not_called_in_order(late_ms, std_ms, ok):
+    found = delay.Delay(1e-3 * late_ms, 1e-3 * std_ms, "strokes into the pad", 0.01)
+    assert delay.judged(found, 0.0).ok is ok
+    assert delay.judged(replace(found, delay_s=found.delay_s + 0.004), 0.004).ok is ok
 
 
 def tells_the_delay(found, late_s):
