@@ -13,6 +13,10 @@ ODD_STEPS = 0.05  # share of the steps between a coarse channel's values that ma
 MANY = 30  # new values that leap, by which it is told
 LEAP = 1.5  # steps of the channel's digits: a slow move through coarse ones goes by single steps
 RARE = 0.01  # of those, that may be followed by another too soon: strays, lost conversions
+LONG_RUN, USUAL = 8, 5.0  # samples of a run of one value that are no chance; and times the length of most runs
+COARSE = 0.5  # of the noise: a channel of coarser digits repeats itself by chance
+NO_STEP = 1e-3  # of the noise, into such a run and out of it
+IN_THE_PAD = 0.05  # of the depth reached
 PART = 0.1  # of all samples that such values stand for: else they are moves between rests
 
 
@@ -67,3 +71,39 @@ def said_of(again: Mask) -> str:
     """What a note says of copies that were left out."""
     every = round(len(again) / np.count_nonzero(~again), 1)
     return f"a new one every {every:g} samples only: those between, which repeat it, were left out"
+
+
+def ceiling(force: Array) -> float | None:
+    """The level of saturation: a long run exactly at the largest magnitude, where runs elsewhere are short."""
+    top = float(np.abs(force).max())
+    if top == 0:
+        return None
+    first, length = runs(force)
+    at_top = np.abs(force[first]) >= top * (1 - 1e-12)
+    longest = int(length[at_top].max())
+    elsewhere = length[~at_top]
+    usual = float(np.quantile(elsewhere, 0.99)) if len(elsewhere) else 1.0
+    return float(force[first][at_top][0]) if longest >= max(10, USUAL * usual) else None
+
+
+def held(force: Array, depth_mm: Array, noise_N: float) -> Mask:
+    """Which samples (m,) of a channel whose digits are finer than its noise repeat the one before in long runs of one
+    value, in the pad (depths, (m,)) and below its ceiling: drop-outs. A run of zeros is none: a pad that has let go, in
+    data that were computed.
+    """
+    none = np.zeros(len(force), dtype=bool)
+    steps = np.abs(np.diff(force))
+    moved = steps[steps > 0]
+    if moved.size < 20 or float(np.quantile(moved, 0.01)) > COARSE * noise_N:
+        return none
+    first, length = runs(force)
+    long = (length >= max(LONG_RUN, USUAL * float(np.quantile(length, 0.95)))) & (force[first] != 0)
+    long &= depth_mm[first] > IN_THE_PAD * depth_mm.max()
+    into, out = np.append(np.inf, steps)[first], np.append(steps, np.inf)[first + length - 1]
+    long &= np.minimum(into, out) > NO_STEP * noise_N  # what comes to rest by itself has no noise that should show
+    level = ceiling(force)
+    if level is not None:
+        long &= force[first] != level
+    again = np.repeat(long, length)
+    again[first] = False
+    return again

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bench.readings import ceiling
 from bench.recording.types import Measurement
 
 from ._kernel import Array
@@ -106,19 +107,13 @@ def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findi
         every.spoilt |= EVERYTHING
     elif top < 10 * noise.force_N:
         out.append(f"The force ({top:.3g} N at most) is less than ten times its noise: no number is told well.")
-    level = _cap(force)
+    level = ceiling(force)
     if level is not None:
         out.append(
             f"The force stands at {level:.4g} N again and again, with nothing above: the channel is saturated there."
             " This costs the law at depth and all shares and rates: the cut-off peaks look like a pad that gives way."
         )
         every.spoilt |= EVERYTHING
-    stuck = _stuck(force, depth, noise, level)
-    if stuck:
-        out.append(
-            f"The force stands still to its last digit for {stuck} samples where its noise should show: drop-outs that"
-            " repeat the last value. This costs the quick rates first."
-        )
     if line := clocks_note(m, noise):
         out.append(line)
         every.spoilt |= {LAW, RATES}
@@ -170,40 +165,6 @@ def _level_notes(
             " and position apart."
         )
     return out
-
-
-def _stuck(force: Array, depth: Array, noise: Noise, cap: float | None) -> int:
-    """Samples in long runs of one value, in the pad, where the cell's digits are finer than its noise; 0: none.
-
-    A run of zeros is left out: a pad that has let go, in data that were computed.
-    """
-    steps = np.abs(np.diff(force))
-    moved = steps[steps > 0]
-    if moved.size < 20 or float(np.quantile(moved, 0.01)) > 0.5 * noise.force_N:
-        return 0  # coarse digits repeat by themselves
-    edges = np.flatnonzero(steps != 0) + 1
-    bounds = np.concatenate([[0], edges, [len(force)]])
-    lengths, first = np.diff(bounds), bounds[:-1]
-    usual = float(np.quantile(lengths, 0.95))
-    long = (lengths >= max(8, 5 * usual)) & (depth[first] > 0.05 * depth.max()) & (force[first] != 0)
-    if cap is not None:
-        long &= force[first] != cap
-    return int(lengths[long].sum())
-
-
-def _cap(force: Array) -> float | None:
-    """The level of saturation: a long run exactly at the largest magnitude, where runs elsewhere are short."""
-    top = float(np.abs(force).max())
-    if top == 0:
-        return None
-    edges = np.flatnonzero(np.diff(force) != 0) + 1
-    bounds = np.concatenate([[0], edges, [len(force)]])
-    lengths, levels = np.diff(bounds), force[bounds[:-1]]
-    at_top = np.abs(levels) >= top * (1 - 1e-12)
-    longest = int(lengths[at_top].max())
-    elsewhere = lengths[~at_top]
-    usual = float(np.quantile(elsewhere, 0.99)) if len(elsewhere) else 1.0
-    return float(levels[at_top][0]) if longest >= max(10, 5 * usual) else None
 
 
 def _move_speeds(m: Measurement, depth_mm: float) -> Array:

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from bench.errors import InputError
 from bench.motion_between import motion_between
-from bench.readings import copies, said_of
+from bench.readings import LONG_RUN, copies, held, runs, said_of
 from bench.recording.types import Measurement
 from sim.grid import union
 
 from ._kernel import Array
 from .long import is_long, shortened
 from .motion import LONG, glanced, jitter
+from .noise import noise_of
 from .returns import with_returns
 from .runs import Run
 
@@ -244,11 +245,20 @@ def _checked(m: Measurement, notes: list[str]) -> Measurement:
 
 
 def _converted(m: Measurement, notes: list[str]) -> Measurement:
-    """Without force samples that only repeat the one before, where a channel is read more often than it converts."""
+    """Without force samples that only repeat the one before: a channel is read more often than it converts, or drops
+    out."""
     again = copies(m.force_N)
+    if again.any():
+        notes.append(f"{m.name}: The force is {said_of(again)}. (Is the load cell read more often than it converts?)")
+    elif int(runs(m.force_N)[1].max()) >= LONG_RUN:
+        again = held(m.force_N, m.position_at_forces_mm(), noise_of([m]).force_N)
+        if again.any():
+            notes.append(
+                f"{m.name}: The force stands still to its last digit for {again.sum()} samples where its noise should"
+                " show: drop-outs that repeat the last value, and were left out."
+            )
     if not again.any():
         return m
-    notes.append(f"{m.name}: The force is {said_of(again)}. (Is the load cell read more often than it converts?)")
     return replace(m, force_time_s=m.force_time_s[~again], force_N=m.force_N[~again])
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bench import identify
 from bench.diagnose import diagnose
 from bench.readings import copies, rows_per_conversion
+from bench.readings import held as drop_outs
 from bench.recording import read_recording, write_csv
 from bench.recording.types import Measurement
 from sim.model import Model
@@ -126,3 +127,35 @@ def test_positions_of_any_bench_are_taken_for_what_they_are() -> None:
     _, x, _ = clean()
     for count_mm in (1e-6, 1e-3, 0.01, 0.1):
         assert not copies(np.rint(x / count_mm) * count_mm).any()
+
+
+def test_a_cell_that_stops_converting_costs_a_fit_nothing() -> None:
+    """From the middle of a hold on it repeats one value; its last moves are lost, and nothing that was felt before."""
+    t, x, force = clean()
+    off: dict[str, list[float]] = {name: [] for name in TRUE}
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        f = np.rint((force + 0.01 * rng.standard_normal(len(t))) / 0.001) * 0.001
+        frozen = int(rng.uniform(0.80, 0.84) * len(t))
+        f[frozen:] = f[frozen]
+        m = Measurement("frozen", t, x + 1e-4 * rng.standard_normal(len(t)), t, f)
+        fitted = identify.fit(m, law="power", order=2)
+        assert any(f"for {len(t) - frozen - 1} samples" in note and "left out" in note for note in fitted.notes)
+        for name, true in TRUE.items():
+            number = fitted.parameters[name]
+            off[name].append((number.value - true) / number.std)
+    assert all(np.sqrt(np.mean(np.square(z))) < 2.0 for z in off.values()), off
+
+
+def test_what_stands_still_for_good_reasons_is_no_drop_out() -> None:
+    rng = np.random.default_rng(1)
+    depth = np.linspace(0.0, 1.0, 400)
+    noisy = np.rint((depth + 0.01 * rng.standard_normal(400)) / 0.001) * 0.001
+    ceiling = np.minimum(noisy, 0.8)
+    let_go = np.where(np.arange(400) > 300, 0.0, noisy)
+    coarse = np.rint(noisy / 0.1) * 0.1
+    settled = 1.0 + np.exp(-np.arange(400.0))  # to the last digit after some 40 samples
+    for force in (noisy, ceiling, let_go, coarse, settled):
+        assert not drop_outs(force, depth, 0.01).any()
+    noisy[200:240] = noisy[200]
+    assert np.array_equal(np.flatnonzero(drop_outs(noisy, depth, 0.01)), np.arange(201, 240))

@@ -149,7 +149,7 @@ CASES = {
     "far apart": (later(0.3), "The force comes 300 ms later than the motion", ("m", "b", "nu_1", "nu_2")),
     "drifting": (drifting, "The clocks of force and position drift apart", ("m", "b", "nu_1", "nu_2")),
     "zeros": (zeros, "isolated drop-outs", ()),
-    "repeats": (repeats, "drop-outs that repeat the last value. This costs the quick rates first", ()),
+    "repeats": (repeats, "drop-outs that repeat the last value, and were left out", ()),
     "gaps": (gaps, "3 gaps in the samples", ()),
 }
 
