@@ -36,6 +36,7 @@ ASTRAY = 1.4  # times what noise makes of a window's value: so far off is it, in
 BETWEEN = 40  # samples with no window of their own between such as have one
 ALONE = 2.5  # times what is left of the noise on either side
 WIDTH = 2.2  # standard deviations on either side of a value
+CLEARLY = 0.005  # of a model's error
 
 
 @compiled("void(float64[::1], float64[::1], float64, float64, float64, int64[::1], int64, float64[::1], float64[::1])")
@@ -386,3 +387,9 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
     moves = tuple((float(time_s[a]), float(time_s[b]), move) for (a, b), move in sorted(planned.items()))
     std, doubt = np.interp(time, time_s, std), np.interp(time, time_s, doubt)
     return Felt(time, position, std, begun.noise, stretch[before], hold[before], doubt, moves)
+
+
+def serves(felt_N: float, reported_N: float) -> bool:
+    """Whether a model errs clearly less on the motion as felt than on the positions as reported, by its errors on both;
+    else what was taken for noise of the positions was felt, or makes no difference."""
+    return felt_N < (1.0 - CLEARLY) * reported_N

@@ -26,7 +26,7 @@ from bench.diagnose.asked_again import NEAR
 from bench.diagnose.channel import Faults, faults, standing_off
 from bench.diagnose.data import prepare
 from bench.errors import InputError
-from bench.felt_motion import felt
+from bench.felt_motion import felt, serves
 from bench.identify.noise import noise_of
 from bench.identify.past import begins_inside
 from bench.identify.problem import sized
@@ -55,9 +55,6 @@ MOST_ZERO = 4.0
 
 STEPS = 20
 """To the state that a pad was in when the data begin, at the most."""
-
-CLEARLY = 0.005
-"""Share of the error by which the motion as felt must be better than the positions as they are."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +117,7 @@ def likeness(model: Model, measurement: Measurement) -> Likeness:
     flagged = ~alone.good
     pressed = begins_inside(measurement, float(measurement.position_mm.max()), noise_of([measurement]).position_mm)
     found = [_along(model, measurement, *path, flagged, pressed) for path in _paths(measurement)]
-    best = found[-1] if found[-1].rmse_N < (1.0 - CLEARLY) * found[0].rmse_N else found[0]
+    best = found[-1] if serves(found[-1].rmse_N, found[0].rmse_N) else found[0]
     flagged = _spoiled(measurement, best.force_N, best.rmse_N, alone)
     judged = replace(_of(measurement, best.force_N, best.moved_mm, flagged), begins_inside=best.begins_inside)
     if best is found[0]:

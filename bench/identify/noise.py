@@ -15,6 +15,8 @@ from .motion import glanced, holds, jitter
 LEVELS = 500_000  # samples whose resolution is looked at
 HOLD = 3000  # samples of a hold that are looked at
 SPARSE = 0.5  # of the noise found: no fit follows noise so far
+LOUD = 0.2  # of the scatter of the force: no load cell is so noisy in a run that tells anything
+FOLLOWED, AROUND = 0.2, 7  # of the square of what the force does from sample to sample, that so many of the motion tell
 DEPTHS = 12  # bins of depth over which the stiffness is estimated
 
 
@@ -67,6 +69,28 @@ def no_louder(noise: Noise, error_N: float) -> Noise:
         return noise
     louder = noise.floor_N / error_N
     return Noise(noise.force_N / louder, noise.position_mm / louder, error_N, noise.from_holds)
+
+
+MOTION_FOR_NOISE = (
+    "The force goes with the motion from sample to sample, and no rest shows its noise: what is taken for noise here is"
+    " motion, so that nothing can be said to be down to it. (Rests, or more samples a second, would show it.)"
+)
+
+
+def of_the_motion(m: Measurement, noise_N: float) -> bool:
+    """Whether what was taken for noise of the force (N) goes with the motion from sample to sample, and is as large as
+    what the force does at all: then these data show no noise, and no error is down to it. So it is where a motion
+    without rests is as quick as its samples."""
+    force = m.force_N[m.counted()]
+    if not noise_N > LOUD * float(np.std(force)):
+        return False
+    bent_mm, bent_N = np.diff(m.position_at_forces_mm()[m.counted()], 2), np.diff(force, 2)
+    if len(bent_N) < 100:
+        return False
+    around = np.lib.stride_tricks.sliding_window_view(bent_mm, AROUND)
+    bent_N = bent_N[AROUND // 2 : -(AROUND // 2)]
+    left = bent_N - around @ np.linalg.lstsq(around, bent_N, rcond=None)[0]
+    return float(np.sum(left**2)) < (1.0 - FOLLOWED) * float(np.sum(bent_N**2))
 
 
 def _about_curve(t: Array, y: Array) -> tuple[Array, float]:

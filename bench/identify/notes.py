@@ -14,7 +14,7 @@ from ._kernel import Array
 from .clocks import clocks_note
 from .estimate import NOTHING, Estimate
 from .motion import glanced, holds, turns
-from .noise import Noise
+from .noise import MOTION_FOR_NOISE, Noise, of_the_motion
 from .nuisance import late_s, moved_mm
 from .past import begins_loaded, fitted_past, said_of_past
 from .problem import Problem
@@ -107,6 +107,9 @@ def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findi
         every.spoilt |= EVERYTHING
     elif top < 10 * noise.force_N:
         out.append(f"The force ({top:.3g} N at most) is less than ten times its noise: no number is told well.")
+    if of_the_motion(m, noise.force_N):
+        out.append(MOTION_FOR_NOISE)
+        every.spoilt |= EVERYTHING
     level = ceiling(force)
     if level is not None:
         out.append(

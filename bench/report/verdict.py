@@ -24,6 +24,9 @@ LAWS = {
 DOWN_TO = 1.05
 """Times the noise: with more, a tenth of the power is something else, which a diagnosis may well name."""
 
+HALF = 50.0
+"""Per cent of the force that a fit must follow to be called a good one, however loud the noise."""
+
 FINISHED = frozenset({"finished", "done", "complete", "completed", "ok", "success"})
 _STOPS = ("limit", "overload", "fault", "stopped", "interrupted", "error", "aborted", "stop")
 
@@ -139,6 +142,8 @@ def judge(fit: FitView) -> tuple[str, str]:
     ratio = rmse / floor if floor > 0 else math.nan
     if not math.isfinite(ratio):
         return "plain", "A model was fitted"
+    if ratio <= 2.0 and percent < HALF:
+        return "bad", "What was taken for noise is most of the force"
     if ratio <= DOWN_TO:
         return "good", "The model explains the force down to the noise"
     if ratio <= 2.0:

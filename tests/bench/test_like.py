@@ -14,6 +14,7 @@ from bench.config import load_model
 from bench.diagnose import diagnose
 from bench.like import likeness
 from bench.recording import read_recording, write_csv
+from bench.recording.types import Measurement
 from sim.model import Model
 from tests.bench.run.benches import SHORT, run
 
@@ -121,3 +122,16 @@ def test_what_a_model_says_of_the_tare_counts_as_zero(fitted):
     assert likeness(biased, measured).rmse_N == pytest.approx(likeness(Model.from_dict(plain), measured).rmse_N)
     untared = likeness(biased, replace(measured, tared_s=None)).rmse_N
     assert untared == pytest.approx(0.5, rel=0.1), "data without a tare have the bias in them"
+
+
+def test_positions_that_are_exact_are_no_worse_for_the_model_of_a_diagnosis():
+    """Steps of 10 µm, each with a row, stamped late by chance: what looks like rounding is the motion itself, and the
+    stamps are those at which the force was felt."""
+    rng = np.random.default_rng(4)
+    t = np.cumsum(rng.uniform(0.11, 0.15, 240))
+    x = 0.01 * np.arange(240) - 0.4
+    force = 26.0 * np.maximum(x, 0.0) ** 1.5 + 0.005 * rng.standard_normal(240)
+    m = Measurement("steps", t, x, t, force)
+    believed = {"elastic": {"law": "power", "p": 20.0, "q": 0.2}, "relaxation": {"shares": [0.3], "rates": [0.6]}}
+    told = diagnose(m, Model.from_dict({"pad": {**believed, "contact": "unilateral"}}))
+    assert likeness(told.model, m).rmse_N == pytest.approx(told.rmse_after, rel=0.01)

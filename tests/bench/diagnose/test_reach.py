@@ -8,7 +8,7 @@ from bench.diagnose.candidates import forms
 from bench.diagnose.numbers import PadNumbers, Structure
 from bench.diagnose.reach import Reach, narrowed
 from bench.diagnose.ripple import ripples
-from sim.effects import effect
+from sim.effects import all_effects, effect
 from sim.elastic import Polynomial
 from sim.pad import Pad
 from sim.relaxation import Relaxation
@@ -60,3 +60,14 @@ def test_a_form_of_which_a_fit_can_change_nothing_is_no_candidate() -> None:
     structure = Structure(PadNumbers(Pad(Polynomial((0.0, 1.0)), Relaxation(), unilateral=True), 2.5, 5.0), ())
     found = [form.name for _, form in forms(structure, False, reach, also_unsought=True)]
     assert "fine_spline" in found and "points" not in found
+
+
+@pytest.mark.parametrize("force_N", [1e-6, 1e-3, 5.0, 7e5])
+@pytest.mark.parametrize("way_mm", [1e-3, 2.0, 500.0])
+def test_no_number_leaves_what_a_model_file_holds(force_N, way_mm):
+    """Cells are pressed with a nanonewton, walls with a meganewton: what is found must be written."""
+    reach = Reach(1e-3, 100.0, travel_mm=way_mm, depth_mm=0.8 * way_mm, force_N=force_N, changes_N=10 * force_N)
+    for cause in all_effects().values():
+        for form in cause.forms:
+            for own, kept in zip(form.parameters, narrowed(form, reach).parameters, strict=True):
+                assert own.lower <= kept.lower <= kept.if_left_out <= kept.upper <= own.upper, (cause.id, own.name)
