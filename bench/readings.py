@@ -10,6 +10,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 ODD_STEPS = 0.05  # share of the steps between a coarse channel's values that may be less: not all values are its own
+BLUR = 0.02  # of a step between values, by which it may be off
 MANY = 30  # new values that leap, by which it is told
 LEAP = 1.5  # steps of the channel's digits: a slow move through coarse ones goes by single steps
 RARE = 0.01  # of those, that may be followed by another too soon: strays, lost conversions
@@ -28,6 +29,21 @@ def resolution(values: Array) -> float:
     steps = np.diff(levels)
     steps = steps[steps > 1e-9 * np.ptp(values)]
     return float(np.quantile(steps, ODD_STEPS, method="lower")) if steps.size else float(np.ptp(values))
+
+
+def spacing(values: Array) -> float:
+    """`resolution`, or the step of a channel so little of which is seen that nearly all its values differ: those stand
+    by whole steps apart, which digits that a file cuts off blur a little; else 0."""
+    step = resolution(values)
+    levels = np.unique(values)
+    if step > 0.0 or levels.size < MANY:
+        return step
+    between = np.diff(levels)
+    between = between[between > 1e-9 * np.ptp(values)]
+    step = float(np.mean(between[between < LEAP * np.quantile(between, ODD_STEPS, method="lower")]))
+    steps = between[between < 0.25 * step / BLUR] / step
+    whole = np.abs(steps - np.rint(steps)) < BLUR * steps
+    return step if len(steps) >= MANY and np.mean(whole) > 1.0 - ODD_STEPS else 0.0
 
 
 def runs(values: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -146,7 +146,7 @@ def _ceiling(force: Array) -> tuple[Mask, float | None]:
     spike = _spikes(force, ~np.repeat(long, length)) if long.any() else mask
     for sign in (1.0, -1.0):
         top = float((sign * force[first[long]]).max()) if long.any() else float((sign * force).max())
-        if abs(top) < 0.05 * span:
+        if top < 0.05 * span:  # the least of forces that all push is no ceiling
             continue
         at = np.abs(sign * force[first] - top) <= 1e-9 * span
         beyond = (sign * force > top + 1e-9 * span) & ~spike

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, poisson
 
-from bench.readings import resolution, runs
+from bench.readings import resolution, runs, spacing
 
 from .coarse import noise_steps
 
@@ -18,6 +18,7 @@ FEW_REPEATS = 4  # equal pairs that are no accident where digits are many
 CHANCE = 1e-7  # of a run of equal values that long, anywhere in the data
 SOME, LATER = 3, 6  # samples of runs that may be accidents
 ACCIDENTS = 0.05  # of the runs flagged, where a channel sticks
+FINE = 3.0  # steps: with more noise a channel has many digits
 HARDLY = 0.8  # steps: less noise hardly leaves one where the force is at rest
 STANDS = 0.5  # share of equal pairs beyond which noise is less than half a step
 LEAPS = 3  # steps by which what has stuck in such a channel catches up, at the least
@@ -53,7 +54,7 @@ def repeated(force: Array, but: Mask) -> Mask:
         return mask
     # how often a sample equals the one before when nothing sticks: judged where values change most
     same = np.concatenate([[0.0], (np.diff(force) == 0).astype(float)])
-    step, counted = resolution(force), ~but[first]
+    step, counted = _step(force), ~but[first]
     if step > 0.0:
         window = max(len(force) // 40, 20)
         shares = np.convolve(same, np.ones(window) / window, mode="same")
@@ -78,6 +79,16 @@ def repeated(force: Array, but: Mask) -> Mask:
     for start, count in zip(first[long].tolist(), length[long].tolist(), strict=True):
         mask[start + 1 : start + count] = True
     return mask
+
+
+def _step(force: Array) -> float:
+    """The step of a channel's values, where noise is of its size; 0: the channel has many digits."""
+    step = spacing(force)
+    if step == resolution(force):
+        return step
+    noise = noise_steps(force, step)
+    size = noise if np.isfinite(noise) else float(np.median(np.abs(np.diff(force)))) / step
+    return step if size < FINE else 0.0
 
 
 def _least(p: float, samples: int) -> float:
@@ -119,7 +130,7 @@ def equal_by_chance(force: Array) -> float:
     if counts.max(initial=0) >= FEW_REPEATS:  # changes come in steps: those of 0 are as many as of one step either way
         return 0.5 * float(counts.max())
     # of any samples two are as close as that one expects one equal pair: what they are written with is finer
-    finest = min(least * float(sizes[0]), _last_digit(force)) if len(sizes) else 0.0
+    finest = max(min(least * float(sizes[0]), _last_digit(force)), spacing(force)) if len(sizes) else 0.0
     scatter = 1.4826 * float(np.median(change))
     return len(force) * finest / max(float(np.sqrt(2.0 * np.pi)) * scatter, 1e-300)
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from bench import identify
 from bench.diagnose import diagnose
-from bench.readings import copies, rows_per_conversion
+from bench.diagnose.channel import faults
+from bench.readings import copies, resolution, rows_per_conversion, spacing
 from bench.readings import held as drop_outs
 from bench.recording import read_recording, write_csv
 from bench.recording.types import Measurement
@@ -159,3 +160,26 @@ def test_what_stands_still_for_good_reasons_is_no_drop_out() -> None:
         assert not drop_outs(force, depth, 0.01).any()
     noisy[200:240] = noisy[200]
     assert np.array_equal(np.flatnonzero(drop_outs(noisy, depth, 0.01)), np.arange(201, 240))
+
+
+@pytest.mark.parametrize("step", [0.48876, 0.0122337])
+def test_a_coarse_channel_of_which_each_level_is_met_once_has_a_step(step: float) -> None:
+    """A ramp through the levels of a converter, in a file of five digits: no value comes often, and all are whole."""
+    rng = np.random.default_rng(3)
+    counts = np.rint(np.cumsum(np.abs(rng.normal(1.5, 1.0, 300))))
+    assert resolution(np.round(25.0 + step * counts, 5)) == 0.0
+    assert spacing(np.round(25.0 + step * counts, 5)) == pytest.approx(step, rel=1e-3)
+    for seed in SEEDS:  # nor has noise any
+        rng = np.random.default_rng(seed)
+        assert spacing(rng.standard_normal(400)) == 0.0
+        assert spacing(np.cumsum(rng.exponential(1.0, 400))) == 0.0
+
+
+def test_a_coarse_channel_at_rest_does_not_stick() -> None:
+    """Twice the same within a step of the converter is no accident, and no fault either."""
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        climbs = np.concatenate([np.zeros(20), np.linspace(0.0, 60.0, 300)]) + 0.15 * rng.standard_normal(320)
+        force = np.round(29.32551 + 0.48876 * np.rint(climbs / 0.48876), 5)
+        found = faults(force)
+        assert not found.stuck.any() and not found.saturated.any() and found.good.mean() > 0.99
