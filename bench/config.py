@@ -280,6 +280,10 @@ def ports_agree(bench: Bench) -> None:
     if bench.sim_name != _sim_name(bench.load_cell.port):
         message = f"load_cell.port is of another simulated bench than motor.port ({ports['motor']})"
         raise InputError(bench.place(("load_cell", "port")), message, f"write sim://{bench.sim_name}/load_cell")
+    for key, port in ports.items():
+        if port != f"sim://{bench.sim_name}/{key}":
+            message = f"{key}.port: there is no simulated device at {port}"
+            raise InputError(bench.place((key, "port")), message, f"write sim://{bench.sim_name}/{key}")
 
 
 def simulated(bench: Bench) -> Bench:

@@ -8,6 +8,7 @@ limited. NaN and infinity are refused everywhere: no file of ours has a use for 
 
 from __future__ import annotations
 
+import codecs
 import json
 import math
 import re
@@ -29,6 +30,7 @@ from bench.places import Key, Places, spell
 
 M = TypeVar("M", bound=BaseModel)
 
+SAVE_AS = "save it as UTF-8"
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 50
 MAX_NODES = 30_000
@@ -186,8 +188,10 @@ def read_text(path: Path) -> str:
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        message = f"is not text: byte 0x{raw[error.start]:02x} at offset {error.start} is no UTF-8"
-        raise InputError(str(path), message) from None
+        line = raw.count(b"\n", 0, error.start) + 1
+        if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            raise InputError(str(path), "is UTF-16", SAVE_AS) from None
+        raise InputError(f"{path}:{line}", f"is not text: byte 0x{raw[error.start]:02x} is no UTF-8", SAVE_AS) from None
 
 
 def parse(text: str, path: Path) -> Document:

@@ -91,12 +91,14 @@ def main(args: argparse.Namespace) -> int:
 def _after(outcome: Outcome, prediction: Prediction, believed: Model | None) -> None:
     try:
         from bench.results import analyse
+        from bench.run.folder import FIT
 
         with status("fitting the pad's model") as progress:
             results = analyse(outcome.folder, prediction=prediction, believed=believed, progress=progress)
     except KeyboardInterrupt as stop:
+        what = "of the diagnosis; the fit is written" if (outcome.folder / FIT).is_file() else "of the fit"
         raise Stopped(
-            f"stopped by {stop_of(stop)} while the model was fitted\n"
+            f"stopped by {stop_of(stop)} in the course {what}\n"
             f"  the recording is whole: `padbench report {outcome.folder}` fits it and writes the rest"
         ) from None
     except OSError as error:

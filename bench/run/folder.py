@@ -94,4 +94,7 @@ def _try_writing(folder: Path) -> None:
 
 
 def _unwritable(folder: Path, error: OSError) -> InputError:
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        file = next((str(above) for above in (folder, *folder.parents) if above.is_file()), "something there")
+        return InputError(str(folder), f"cannot be made: {file} is a file", "choose another place with --out")
     return InputError(str(folder), f"cannot be written: {error.strerror}", "choose another place with --out")

@@ -211,6 +211,7 @@ def test_a_recording_that_is_none(padbench, content, message):
         (("run", "quick", "--operator", " "), (r"--operator: is empty",)),
         (("run", "quick", "--out", "full"), (r"full: is not empty", "no run overwrites another")),
         (("run", "quick", "--out", "data.csv"), (r"data\.csv: is a file, not a folder",)),
+        (("run", "quick", "--out", "data.csv/sub"), (r"data\.csv/sub: cannot be made: data\.csv is a file", "--out")),
         (("run", "quick", "--out", "/proc/x"), (r"/proc/x: cannot be written", "--out")),
         (("check", "missing.yaml"), (r"missing\.yaml: there is no such file",)),
         (("emulate", "nope"), (r"no shipped bench of that name",)),

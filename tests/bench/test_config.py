@@ -192,6 +192,7 @@ def test_schemas_are_draft_07(kind: str) -> None:
         ("sim://", "sim://bench/load_cell", "motor", "names no simulated bench"),
         ("sim://bench/motor", "sim://", "load_cell", "names no simulated bench"),
         ("sim://a/motor", "sim://b/load_cell", "load_cell", "another simulated bench"),
+        ("sim://bench/motor", "sim://bench/loadcell", "load_cell", "no simulated device at sim://bench/loadcell"),
     ],
 )
 def test_ports_that_do_not_belong_together(padbench, tmp_path, motor, load_cell, line, words):

@@ -103,16 +103,20 @@ def test_what_is_refused_is_named_with_its_place(text: str, place: str, words: s
 def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "junk.yaml").write_bytes(b"\x89PNG\r\n\x1a\n\x00\x00")
     (tmp_path / "large.yaml").write_text("a: 1\n" + "# much\n" * (MAX_BYTES // 6))
-    for name, words in [
-        ("missing.yaml", "no such file"),
-        ("", "is a directory"),
-        ("junk.yaml", "byte 0x89 at offset 0"),
-        ("large.yaml", "larger than 1 MB"),
+    (tmp_path / "latin.yaml").write_bytes("a: 1\nb: 2\nname: café\n".encode("latin-1"))
+    (tmp_path / "wide.yaml").write_bytes("name: café\n".encode("utf-16"))
+    for name, at, words, cure in [
+        ("missing.yaml", "", "no such file", ""),
+        ("", "", "is a directory", ""),
+        ("junk.yaml", ":1", "byte 0x89 is no UTF-8", "save it as UTF-8"),
+        ("latin.yaml", ":3", "byte 0xe9 is no UTF-8", "save it as UTF-8"),
+        ("wide.yaml", "", "is UTF-16", "save it as UTF-8"),
+        ("large.yaml", "", "larger than 1 MB", ""),
     ]:
         with pytest.raises(InputError) as caught:
             read_yaml(tmp_path / name)
-        assert words in caught.value.message
-        assert str(tmp_path / name) in caught.value.place
+        assert words in caught.value.message and cure in caught.value.cure
+        assert f"{tmp_path / name}{at}" == caught.value.place
 
 
 def test_a_byte_order_mark_is_not_content(tmp_path: Path) -> None:
