@@ -291,7 +291,7 @@ def simulated(bench: Bench) -> Bench:
     own = re.sub(r"[^A-Za-z0-9_-]", "-", bench.name)
     name = _sim_name(bench.motor.port) or _sim_name(bench.load_cell.port) or own
     ports = {
-        key: spec if _sim_name(spec.port) == name else spec.model_copy(update={"port": f"sim://{name}/{key}"})
+        key: spec.model_copy(update={"port": f"sim://{name}/{key}"})
         for key, spec in (("motor", bench.motor), ("load_cell", bench.load_cell))
     }
     # model_copy keeps the private text and source: a simulation.pad stays relative to the bench file
