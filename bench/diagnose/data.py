@@ -366,12 +366,18 @@ def _tared(m: Measurement, grid: Array) -> Mask | None:
 
 def _folds(position: Array, weight: Array, travel_mm: float, pressed: bool) -> NDArray[np.intp]:
     """Contiguous blocks dealt out in turn; half by samples and half by travel, so that fast moves are spread too. Of a
-    run that begins `pressed` the first is in none (−1): nothing else tells what its past has left."""
+    run that begins `pressed` the first is in none (−1): nothing else tells what its past has left; nor is one that goes
+    deeper than all others, as the end of a single press: what holds there is not told by what is shallower."""
     travel = np.abs(np.diff(position, prepend=position[0]))
     travel[travel < 2e-3 * travel_mm] = 0.0
     along = np.cumsum(weight / max(weight.sum(), 1.0) / 2 + travel / max(travel.sum(), 1e-300) / 2)
     block = np.minimum((along * BLOCKS).astype(np.intp), BLOCKS - 1)
-    return np.where((block == 0) & pressed, -1, block % FOLDS)
+    deepest = np.full(BLOCKS, -np.inf)
+    np.maximum.at(deepest, block, position)
+    alone = int(np.argmax(deepest))
+    inside = position[block == alone]
+    beyond = bool(np.median(inside) > np.delete(deepest, alone).max())
+    return np.where((block == 0) & pressed | (block == alone) & beyond, -1, block % FOLDS)
 
 
 def _averaged(full: Data, owner: NDArray[np.intp]) -> Data:

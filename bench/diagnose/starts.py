@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 MOST_STARTS = 96
 LOWEST_RINGING_HZ, FREQUENCIES = 4.0, 32
 NEARBY, ABOUT = 7, 2.0  # frequencies about one that was found, and up to how many times it, either way
+RISEN, STANDS_OUT, DEEP = 0.005, 6.0, 0.05  # of the greatest force, and deviations of its noise, that are no free air;
+# of the depth, below which a surface has another start
 MANY = 24  # starts of another form than the first, beyond which it has none of its own
 BETWEEN, KEPT = 3, 8  # further places between two of those; starts of which the one that keeps its promise comes first
 MOST_SHIFT, FINE = 0.04, 0.05  # of the run, by which a force is sought shifted in time, and by halves of that down to
@@ -171,6 +173,7 @@ def starts(
         found.append(Start(trial.with_start(**{amplitude.name: _inside(sign * size, amplitude.lower, amplitude.upper)}),
                            promise))  # fmt: skip
     found += _far_off(signatures, cause) if rich and form.time_shift is not None else []
+    found += _at_the_surface(signatures, cause) if cause.id == "contact_offset" else []
     found.sort(key=lambda s: -s.promise)
     if rich and any(p.bend for p in form.parameters):  # of many that promise as much, the one that keeps it comes first
         first = max(found[:KEPT], key=lambda s: signatures.whole(s.cause))
@@ -205,6 +208,21 @@ def _far_off(signatures: Signatures, cause: Cause) -> list[Start]:
     at = [s for size in sizes for s in (size, -size) if amplitude.lower < s < amplitude.upper]
     started = [cause.with_start(**{amplitude.name: size}) for size in at]
     return [Start(c, signatures.whole(c)) for c in started]
+
+
+def _at_the_surface(signatures: Signatures, cause: Cause) -> list[Start]:
+    """A surface where the force begins to rise, where that is deep below the one believed: from there the pad is the
+    one believed, and no more the one that was bent to rise so late."""
+    data, pad, amplitude = signatures.data, signatures.fit.structure.pad, cause.amplitude
+    assert amplitude is not None
+    counted = data.weight > 0
+    force, position = data.force_N[counted], data.position_mm[counted]
+    least_N = max(RISEN * float(np.max(force)), STANDS_OUT * float(np.median(data.total_N[counted])))
+    risen = np.flatnonzero((force[:-1] > least_N) & (force[1:] > least_N))
+    if not pad.pad.unilateral or not len(risen) or position[risen[0]] < DEEP * pad.depth_mm:
+        return []
+    offset = _inside(float(position[max(risen[0] - 1, 0)]), amplitude.lower, amplitude.upper)
+    return [Start(cause.with_start(**{amplitude.name: offset}), np.inf, pad.x())]
 
 
 def _rippling(signatures: Signatures, effect: Effect, cause: Cause, most: int) -> list[Start]:
