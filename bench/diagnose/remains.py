@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 FEWEST = 60  # samples that a test is made on
 TIMES = 3.0  # the noise's power: in a campaign no model that lacks nothing left 1.3 times
 LEVEL = 0.01
+LEAST = 8  # samples of a group
 CRUMB = 0.002
 SENTENCES = {
     "depth": "differs with the depth",
@@ -68,7 +69,7 @@ def _grouped(e: Array, number: NDArray[np.intp]) -> tuple[float, int, float]:
     for k in range(int(number.max()) + 1):
         inside = number == k
         n = int(inside.sum())
-        if n < 8:
+        if n < LEAST:
             continue
         part = float(e[inside].sum()) ** 2 / n
         value += part
@@ -106,7 +107,7 @@ def _groups(data: Data, use: NDArray[np.intp]) -> dict[str, NDArray[np.intp]]:
     for edge in edges.tolist():
         corner[max(edge - 3, 0) : edge + 5] = 1 if still[min(edge + 1, len(still) - 1)] else 2
     lap = np.where(still, 1 + np.clip(np.log2(1 + since / 0.02), 0, 9).astype(np.intp), 0)
-    return {
+    groups = {
         "depth": bins,
         "way": bins * 3 + way,
         "time": np.minimum(((time - time[0]) / span * 20).astype(np.intp), 19),
@@ -114,3 +115,10 @@ def _groups(data: Data, use: NDArray[np.intp]) -> dict[str, NDArray[np.intp]]:
         "phase": lap * 2 + (depth > 0.5 * reach),
         "corner": corner,
     }
+    asked = {"way": way[~still], "speed": (paces * 3 + way)[~still], "phase": still.astype(np.intp), "corner": corner}
+    return {name: number for name, number in groups.items() if name not in asked or _several(asked[name])}
+
+
+def _several(number: NDArray[np.intp]) -> bool:
+    """Whether there is more than one group that counts: of a run that only goes in no way out can be told."""
+    return int(np.count_nonzero(np.bincount(number) >= LEAST)) > 1 if len(number) else False

@@ -7,6 +7,7 @@ import pytest
 
 from bench.diagnose import diagnose
 from bench.diagnose.data import prepare
+from bench.diagnose.remains import remains
 from bench.recording.types import Measurement
 from sim.model import Model
 from tests.bench.diagnose.small import measurement
@@ -49,3 +50,16 @@ def test_what_goes_deeper_than_all_else_is_not_held_out() -> None:
     for protocol in ("staircase", "rich", "rate_sweep"):
         m = measurement(null_case(3, protocol=protocol))
         assert prepare(m, np.ones(len(m.force_N), dtype=bool)).full.fold.min() == 0
+
+
+def test_no_test_asks_for_what_a_run_does_not_hold() -> None:
+    """One way in at one speed: no way out, no other speed and no rest can differ from it."""
+    m = pressed(0.0, 0)
+    p = prepare(m, np.ones(len(m.force_N), dtype=bool))
+    residual = 0.1 * np.sin(3.0 * p.full.time_s)
+    asked = {r.name for r in remains(p.full, residual, 2, None)}
+    assert {"depth", "time", "memory"} <= asked and not asked & {"way", "speed", "phase"}
+    m = measurement(null_case(3, protocol="staircase"))
+    p = prepare(m, np.ones(len(m.force_N), dtype=bool))
+    asked = {r.name for r in remains(p.full, np.zeros(p.full.size), 2, None)}
+    assert asked == {"depth", "way", "time", "speed", "phase", "corner", "memory"}
