@@ -61,5 +61,5 @@ def test_no_test_asks_for_what_a_run_does_not_hold() -> None:
     assert {"depth", "time", "memory"} <= asked and not asked & {"way", "speed", "phase"}
     m = measurement(null_case(3, protocol="staircase"))
     p = prepare(m, np.ones(len(m.force_N), dtype=bool))
-    asked = {r.name for r in remains(p.full, np.zeros(p.full.size), 2, None)}
+    asked = {r.name for r in remains(p.full, 0.1 * np.sin(3.0 * p.full.time_s), 2, None)}
     assert asked == {"depth", "way", "time", "speed", "phase", "corner", "memory"}
