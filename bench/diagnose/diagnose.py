@@ -199,6 +199,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
     reported_N = on_reported(m, prepared, whole[0]) + hum_N[at], on_reported(m, prepared, whole[1])
     other = _errors_N(raw.force_N[at], reported_N, inside, good)
     rmse_before, rmse_after = rmse if serves(rmse[1], other[1]) else other  # as `bench.like` has it
+    in_question = _units(m, search.believed, path.fits[0], whole[1])
     return Diagnosis(
         verdict=verdict,
         causes=causes,
@@ -213,7 +214,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
         model_dict=model_of(believed, whole[1], prepared, flags.limit_N),
         notes=list(m.notes),
         doubts=[
-            *_units(m, search.believed, path.fits[0], whole[1]),
+            *in_question,
             *([] if SHAKING & (known | {c.id for c in causes}) else prepared.said_of_noise),
             *([MOTION_FOR_NOISE] if no_noise else []),
             *_past(search),
@@ -222,6 +223,7 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
             *([ENDED_EARLY] if path.cut_short and verdict != "consistent" else []),
             *([FEW_TO_TELL.format(counted)] if (counted := np.count_nonzero(full.weight)) < FEWEST else []),
         ],
+        in_question=in_question,
         remainders=tests,
         as_given=_as_given(prepared, search.believed, whole[0], rmse_before) if verdict == "consistent" else "",
         name=m.name,

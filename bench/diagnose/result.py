@@ -116,6 +116,8 @@ class Diagnosis:
     notes: list[str] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
     """What makes the data's units or sign doubtful, or is odd about their noise; in the file's notes too."""
+    in_question: list[str] = field(default_factory=list)
+    """Those of them with which all else falls: units and sign."""
     remainders: list[Remainder] = field(default_factory=list)
     as_given: str = ""
     """How far a consistent belief errs with the numbers it was given; empty where hardly more than refitted."""

@@ -24,7 +24,8 @@ def doubts(m: Measurement, believed: Pad, refitted: Pad) -> list[str]:
     deep = counted & (depth_mm > DEEPEST * deepest_mm)
     if deep.any() and float(np.median(m.force_N[deep])) < -PUSHED_BACK * float(np.abs(m.force_N[counted]).max()):
         return [
-            "the force is negative where the pad is pressed the most: is its sign turned? (a push counts as positive)"
+            "the force is negative where the pad is pressed the most: is its sign turned? (A push counts as positive; "
+            "`--units force=-N` turns that of a CSV, `sign: -1` of the load cell that of a bench.)"
         ]
     out = []
     stiffer = _stiffer(believed, refitted, deepest_mm)

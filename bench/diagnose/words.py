@@ -156,7 +156,7 @@ def lowered(sentence: str) -> str:
 
 def lines(d: Diagnosis, how_next: str = HOW_NEXT) -> list[str]:
     """The diagnosis in some lines for a terminal; `how_next`: where the next test is, or how to come by it."""
-    out = [headline(d)]
+    out = [headline(d), *(f"  first of all: {sentence}" for sentence in d.in_question)]
     out += [f"  {d.as_given}"] if d.as_given else []
     for number, cause in enumerate(d.causes, 1):
         out += _cause(number, cause)
@@ -178,11 +178,12 @@ def remains(d: Diagnosis, most: int = REMAINS) -> list[str]:
 
 
 def warnings(d: Diagnosis) -> list[str]:
-    """What makes the data or the names doubtful, and the cure."""
+    """What else makes the data or the names doubtful, and the cure."""
+    doubts = [sentence for sentence in d.doubts if sentence not in d.in_question]
     if not d.seen_once:
-        return d.doubts
+        return doubts
     return [
-        *d.doubts,
+        *doubts,
         f"too little comes twice in this run to tell what acts with the motion from an odd pad: no such name is more"
         f" than {percent(TOLD_ONCE)} sure (press and return twice or more, or hold at {LEVELS} depths or more)",
     ]

@@ -58,7 +58,8 @@ def card(d: Diagnosis, heading: str = "", *, notes: bool = True, remark: str = "
     `remark`: a sentence under the numbers.
     """
     tone = "fair" if d.verdict == "unexplained" and d.causes else TONES.get(d.verdict, "plain")
-    said = [_sentence(d.as_given)] if d.as_given else []
+    said = [f"First of all: {sentence}" for sentence in d.in_question]
+    said += [_sentence(d.as_given)] if d.as_given else []
     said += [_sentence(cause.explanation) for cause in d.causes]
     said.append(" ".join(_sentence(words_) for words_ in words.remains(d)) if d.verdict != "consistent" else "")
     said += [_sentence(sentence) for sentence in words.warnings(d)]

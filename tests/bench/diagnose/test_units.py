@@ -44,7 +44,8 @@ def test_who_diagnoses_data_in_other_units_is_told(how, said):
     d = diagnose(scaled(measurement(c), **how), Model.from_dict(c.believed))
     assert len(d.doubts) == bool(said) and all(said in sentence for sentence in d.doubts)
     assert set(d.doubts) <= set(d.to_json()["notes"])
-    assert all(any(sentence in line for line in lines(d)) for sentence in d.doubts)
+    assert all(sum(sentence in line for line in lines(d)) == 1 for sentence in d.doubts)
+    assert d.in_question == d.doubts and (not said or "first of all: " in lines(d)[1])
 
 
 def pad(m: float, rates: tuple[float, ...]) -> Pad:
