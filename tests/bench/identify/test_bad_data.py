@@ -104,6 +104,11 @@ def later(by_s: float) -> Callable[[int], Rows]:
     return case
 
 
+def zero_within(seed: int) -> Rows:
+    made = rows(seed)
+    return replace(made, position_mm=made.position_mm - 1.2)
+
+
 def drifting(seed: int) -> Rows:
     made = rows(seed)
     return replace(made, force_time_s=1.01 * made.time_s)
@@ -148,6 +153,7 @@ CASES = {
     "early": (later(-0.02), "The force comes 20 ms earlier than the motion", ("m", "b", "nu_1", "nu_2")),
     "far apart": (later(0.3), "The force comes 300 ms later than the motion", ("m", "b", "nu_1", "nu_2")),
     "drifting": (drifting, "The clocks of force and position drift apart", ("m", "b", "nu_1", "nu_2")),
+    "zero within": (zero_within, "The force acts above the surface too", ("m", "b", "c_1", "nu_1", "nu_2")),
     "zeros": (zeros, "isolated drop-outs", ()),
     "repeats": (repeats, "drop-outs that repeat the last value, and were left out", ()),
     "gaps": (gaps, "3 gaps in the samples", ()),
@@ -173,7 +179,9 @@ def of_data(made: Rows) -> list[str]:
     return findings(build([m]), noise_of([m]), unilateral=True).notes
 
 
-@pytest.mark.parametrize("name", ["saturated", "one speed", "sign", "late", "early", "drifting", "repeats"])
+@pytest.mark.parametrize(
+    "name", ["saturated", "one speed", "sign", "late", "early", "drifting", "zero within", "repeats"]
+)
 def test_what_the_data_show_by_themselves_is_said_in_every_draw(name):
     made, said, _ = CASES[name]
     for seed in range(5):
