@@ -392,4 +392,4 @@ def felt(time_s: Array, position_mm: Array) -> Felt:
 def serves(felt_N: float, reported_N: float) -> bool:
     """Whether a model errs clearly less on the motion as felt than on the positions as reported, by its errors on both;
     else what was taken for noise of the positions was felt, or makes no difference."""
-    return felt_N < (1.0 - CLEARLY) * reported_N
+    return not felt_N >= (1.0 - CLEARLY) * reported_N  # nor where on those it is no plant at all

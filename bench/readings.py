@@ -40,6 +40,8 @@ def spacing(values: Array) -> float:
         return step
     between = np.diff(levels)
     between = between[between > 1e-9 * np.ptp(values)]
+    if between.size < MANY:
+        return 0.0
     step = float(np.mean(between[between < LEAP * np.quantile(between, ODD_STEPS, method="lower")]))
     steps = between[between < 0.25 * step / BLUR] / step
     whole = np.abs(steps - np.rint(steps)) < BLUR * steps
@@ -102,9 +104,9 @@ def ceiling(force: Array) -> float | None:
     return float(force[first][at_top][0]) if longest >= max(10, USUAL * usual) else None
 
 
-def held(force: Array, depth_mm: Array, noise_N: float) -> Mask:
+def drop_outs(force: Array, depth_mm: Array, noise_N: float) -> Mask:
     """Which samples (m,) of a channel whose digits are finer than its noise repeat the one before in long runs of one
-    value, in the pad (depths, (m,)) and below its ceiling: drop-outs. A run of zeros is none: a pad that has let go, in
+    value, in the pad (depths, (m,)) and below its ceiling. A run of zeros is none: a pad that has let go, in
     data that were computed.
     """
     none = np.zeros(len(force), dtype=bool)

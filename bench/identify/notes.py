@@ -22,7 +22,13 @@ from .problem import Problem
 TOO_FAR_APART = "The samples lie too far apart to tell their noise: it is no more than the error of this fit."
 LEAST_WAY, CLEAR_WAY = 1e-3, 0.05  # of the depth: less is no motion that a law is told by; more is no encoder's noise
 
-NEAR, LOADED, OFTEN = 0.03, 0.1, 0.1  # of the travel, above the surface; of the greatest force, there; of the samples
+NEAR, LOADED, MUCH, OFTEN = (
+    0.03,
+    0.1,
+    0.5,
+    0.1,
+)  # of the travel, above the surface; of the greatest force, pushed there,
+# and either way; of the samples
 
 LAW, SHARES, RATES = "law", "shares", "rates"
 EVERYTHING = frozenset({LAW, SHARES, RATES})
@@ -109,13 +115,14 @@ def _about(m: Measurement, noise: Noise, unilateral: bool, pasts: bool) -> Findi
         every.spoilt |= EVERYTHING
     elif top < 10 * noise.force_N:
         out.append(f"The force ({top:.3g} N at most) is less than ten times its noise: no number is told well.")
-    outside = (depth < -NEAR * float(np.ptp(depth))) & (np.abs(force) > LOADED * top)
+    # a bonded pad that has relaxed pulls there, and less than it was pressed
+    acts = (force > max(LOADED * top, 6 * noise.force_N)) | (np.abs(force) > max(MUCH * top, 6 * noise.force_N))
+    outside = (depth < -NEAR * float(np.ptp(depth))) & acts
     if float(np.mean(outside)) > OFTEN:
         out.append(
             f"The force acts above the surface too ({100 * float(np.mean(outside)):.0f} % of the samples), where no law"
             " here bears anything. (Is 0 mm the surface, and is this a pad that is pressed in?)"
         )
-        every.spoilt |= EVERYTHING
     if of_the_motion(m, noise.force_N):
         out.append(MOTION_FOR_NOISE)
         every.spoilt |= EVERYTHING

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bench.errors import InputError
 from bench.motion_between import motion_between
-from bench.readings import LONG_RUN, copies, held, runs, said_of
+from bench.readings import LONG_RUN, copies, drop_outs, runs, said_of
 from bench.recording.types import Measurement
 from sim.grid import union
 
@@ -251,7 +251,7 @@ def _converted(m: Measurement, notes: list[str]) -> Measurement:
     if again.any():
         notes.append(f"{m.name}: The force is {said_of(again)}. (Is the load cell read more often than it converts?)")
     elif int(runs(m.force_N)[1].max()) >= LONG_RUN:
-        again = held(m.force_N, m.position_at_forces_mm(), noise_of([m]).force_N)
+        again = drop_outs(m.force_N, m.position_at_forces_mm(), noise_of([m]).force_N)
         if again.any():
             notes.append(
                 f"{m.name}: The force stands still to its last digit for {again.sum()} samples where its noise should"

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from bench import identify
 from bench.diagnose import diagnose
 from bench.diagnose.channel import faults
-from bench.readings import copies, resolution, rows_per_conversion, spacing
-from bench.readings import held as drop_outs
+from bench.readings import copies, drop_outs, resolution, rows_per_conversion, spacing
 from bench.recording import read_recording, write_csv
 from bench.recording.types import Measurement
 from sim.model import Model

@@ -78,7 +78,7 @@ PROTOCOLS = {
     "larger than a megabyte": ("#" * 1_000_001, "larger than 1 MB"),
     "NUL": (b"name: a\0b\n", "U\\+0000"),
     "no UTF-8": (b"name: \xff\xfe\n", "no UTF-8"),
-    "UTF-16": ("name: p\n".encode("utf-16"), "no UTF-8"),
+    "UTF-16": ("name: p\n".encode("utf-16"), "is UTF-16"),
     "half a character": (b'name: "\\ud800"\n', "surrogate"),
     "a name that is a path": (f"name: ../../etc/cron\n{STEP}", "name"),
     "a name that is a page": (f"name: <script>alert(1)</script>\n{STEP}", "name"),

@@ -153,7 +153,7 @@ CASES = {
     "early": (later(-0.02), "The force comes 20 ms earlier than the motion", ("m", "b", "nu_1", "nu_2")),
     "far apart": (later(0.3), "The force comes 300 ms later than the motion", ("m", "b", "nu_1", "nu_2")),
     "drifting": (drifting, "The clocks of force and position drift apart", ("m", "b", "nu_1", "nu_2")),
-    "zero within": (zero_within, "The force acts above the surface too", ("m", "b", "c_1", "nu_1", "nu_2")),
+    "zero within": (zero_within, "The force acts above the surface too", ()),
     "zeros": (zeros, "isolated drop-outs", ()),
     "repeats": (repeats, "drop-outs that repeat the last value, and were left out", ()),
     "gaps": (gaps, "3 gaps in the samples", ()),
