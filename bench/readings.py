@@ -32,13 +32,9 @@ def resolution(values: Array) -> float:
 
 
 def spacing(values: Array) -> float:
-    """`resolution`, or the step of a channel so little of which is seen that nearly all its values differ: those stand
-    by whole steps apart, which digits that a file cuts off blur a little; else 0."""
-    step = resolution(values)
-    levels = np.unique(values)
-    if step > 0.0 or levels.size < MANY:
-        return step
-    between = np.diff(levels)
+    """Step of a quantised channel so little of which is seen that nearly all its values differ (no `resolution`): they
+    stand by whole steps apart, which digits that a file cuts off blur a little. Else 0."""
+    between = np.diff(np.unique(values))
     between = between[between > 1e-9 * np.ptp(values)]
     if between.size < MANY:
         return 0.0

@@ -357,6 +357,15 @@ def prepare(m: Measurement, good: Mask, felt_at: Callable[[Array], Array] | None
     )
 
 
+def as_reported(m: Measurement) -> tuple[Data, NDArray[np.intp]]:
+    """Positions and stamps of a measurement as they were reported, to simulate on: what no force is held against; and
+    where its forces stand there (m,)."""
+    time, at = union(m.position_time_s, m.force_time_s)
+    none, fold = np.zeros(len(time)), np.zeros(len(time), dtype=np.intp)
+    position = np.interp(time, m.position_time_s, m.position_mm)
+    return Data(time, position, none, none, np.ones(len(time)), fold, tared=_tared(m, time)), at
+
+
 def _tared(m: Measurement, grid: Array) -> Mask | None:
     if m.tared_s is None:
         return None

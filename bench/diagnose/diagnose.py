@@ -27,7 +27,7 @@ from .candidates import CHANNEL
 from .channel import FEW, Faults, faults, not_of_the_motion
 from .channel_causes import by_themselves, channel_causes, joined
 from .contact import stays_bonded
-from .data import Prepared, prepare
+from .data import Prepared, as_reported, prepare
 from .evidence import SPEAKS, beyond_limit, held_back
 from .hum import hidden
 from .needed import Needed, needed
@@ -35,7 +35,7 @@ from .noise import SETTLED_S
 from .noiseless import without_noise
 from .numbers import PadNumbers, Structure, cause_of
 from .path import Path
-from .refit import Fit, force_at, on_reported, placed
+from .refit import Fit, force_at, placed
 from .remains import FEWEST, beyond_chance, remains
 from .result import Alternative, Diagnosis
 from .search import A_PART, Search
@@ -196,8 +196,9 @@ def _concluded(m: Measurement, believed: Model, ended: _Ended, begun: float) -> 
     inside = m.counted()[prepared.kept]
     good = raw.weight[at] > 0
     rmse = _errors_N(raw.force_N[at], (before[at], after[at]), inside, good)
-    reported_N = on_reported(m, prepared, whole[0]) + hum_N[at], on_reported(m, prepared, whole[1])
-    other = _errors_N(raw.force_N[at], reported_N, inside, good)
+    reported, where = as_reported(m)
+    first_N, last_N = (force_at(reported, f.structure, f.x)[where][prepared.kept] for f in whole)
+    other = _errors_N(raw.force_N[at], (first_N + hum_N[at], last_N), inside, good)
     rmse_before, rmse_after = rmse if serves(rmse[1], other[1]) else other  # as `bench.like` has it
     in_question = _units(m, search.believed, path.fits[0], whole[1])
     return Diagnosis(

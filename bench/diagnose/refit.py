@@ -10,11 +10,9 @@ from scipy.optimize import Bounds, minimize
 
 from bench.identify._kernel import accumulate
 from bench.identify.solver import minimise
-from bench.recording.types import Measurement
-from sim.grid import union
 from sim.pad import Pad
 
-from .data import Data, Prepared
+from .data import Data
 from .numbers import Structure
 
 Array = NDArray[np.float64]
@@ -80,20 +78,6 @@ def force_at(data: Data, structure: Structure, x: Array) -> Array:
     # the tare takes the pad's own force at that time off, and leaves its own error, which is the offset
     zero_N = 0.0 if data.tared is None else float(np.mean(force[data.tared]))
     return np.asarray(force - zero_N + structure.offset_N(x))
-
-
-def on_reported(m: Measurement, prepared: Prepared, fit: Fit) -> Array:
-    """Simulated force where forces were kept (k,), N, over the positions and stamps as they were reported."""
-    structure, x = fit.structure, fit.x
-    stamps_s, at = union(m.position_time_s, m.force_time_s)
-    position_mm = m.position_mm + structure.surface_mm(x)
-    if late_s := structure.late_s(x):
-        position_mm = position_mm - late_s * np.gradient(m.position_mm, m.position_time_s)
-    with np.errstate(all="ignore"):
-        force = structure.cascade(x).simulate_at(m.position_time_s, position_mm, stamps_s)
-    tared = stamps_s <= -np.inf if m.tared_s is None else (stamps_s >= m.tared_s[0]) & (stamps_s <= m.tared_s[1])
-    zero_N = float(np.mean(force[tared])) if tared.any() else 0.0
-    return np.asarray((force - zero_N + structure.offset_N(x))[at][prepared.kept])
 
 
 def errors(data: Data, structure: Structure, x: Array) -> Array:

@@ -83,9 +83,11 @@ def repeated(force: Array, but: Mask) -> Mask:
 
 def _step(force: Array) -> float:
     """The step of a channel's values, where noise is of its size; 0: the channel has many digits."""
+    if (known := resolution(force)) > 0.0:
+        return known
     step = spacing(force)
-    if step == resolution(force):
-        return step
+    if step == 0.0:
+        return 0.0
     noise = noise_steps(force, step)
     size = noise if np.isfinite(noise) else float(np.median(np.abs(np.diff(force)))) / step
     return step if size < FINE else 0.0
