@@ -131,7 +131,7 @@ def _paths(measurement: Measurement) -> Iterator[tuple[Array, Array, Array]]:
     yield measurement.position_time_s, measurement.position_mm, measurement.force_time_s
     told = restamped(measurement)
     motion = felt(told.position_time_s, told.position_mm)
-    if not np.array_equal(motion.position_mm, measurement.position_mm):
+    if told is not measurement or not np.array_equal(motion.position_mm, measurement.position_mm):
         time, _ = union(motion.time_s, told.force_time_s)
         yield time, motion.at(time), told.force_time_s
 

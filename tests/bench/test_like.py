@@ -124,17 +124,19 @@ def test_what_a_model_says_of_the_tare_counts_as_zero(fitted):
     assert untared == pytest.approx(0.5, rel=0.1), "data without a tare have the bias in them"
 
 
-def test_positions_that_are_exact_are_no_worse_for_the_model_of_a_diagnosis():
+@pytest.mark.parametrize("felt_late", [True, False])
+def test_positions_that_are_exact_are_no_worse_for_the_model_of_a_diagnosis(felt_late):
     """Steps of 10 µm, each with a row, stamped late by chance: what looks like rounding is the motion itself, and the
-    stamps are those at which the force was felt."""
+    stamps are those at which the force was felt, or the force was felt at even times and only stamped so."""
     rng = np.random.default_rng(4)
     t = 0.128 * np.arange(240) + rng.uniform(0.0, 0.06, 240)
     x = 0.01 * np.arange(240) - 0.4
     elastic = 26.0 * np.maximum(x, 0.0) ** 1.5
     held = np.zeros(240)  # by a mode of 0.3 s: each ramp's share, as far as it has not relaxed
+    at = t if felt_late else 0.128 * np.arange(240)
     for i in range(1, 240):
-        gone = np.exp(-3.0 * (t[i] - t[i - 1]))
-        held[i] = gone * held[i - 1] + (1.0 - gone) / (3.0 * (t[i] - t[i - 1])) * (elastic[i] - elastic[i - 1])
+        gone = np.exp(-3.0 * (at[i] - at[i - 1]))
+        held[i] = gone * held[i - 1] + (1.0 - gone) / (3.0 * (at[i] - at[i - 1])) * (elastic[i] - elastic[i - 1])
     force = 0.2 * elastic + 0.8 * held + 0.005 * rng.standard_normal(240)
     m = Measurement("steps", t, x, t, force)
     believed = {"elastic": {"law": "power", "p": 20.0, "q": 0.2}, "relaxation": {"shares": [0.3], "rates": [0.6]}}
